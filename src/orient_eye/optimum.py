@@ -1,0 +1,109 @@
+"""The best action for a saccade, by search: the yardstick for everything learned.
+
+Differential evolution over the box of actions, for many saccades side by side, so that every generation
+is one batch of the plant. It needs no gradient, so that neither the cliff of the reward in k0 (an
+overshoot costs decades) nor the kink of the settling time misleads it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orient_eye.errors import InputError
+from orient_eye.saccade import Fixation, SaccadeTask
+
+Array = NDArray[np.float64]
+_ISLANDS = 3
+_MERGE = 0.5  # share of the generations after which the islands become one
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best actions found.
+
+    Attributes:
+        action: B, D, k0 of each driven motor, (saccades, driven, 3).
+        reward: their total reward, (saccades,).
+        evaluations: how many saccades the search performed.
+    """
+
+    action: Array
+    reward: Array
+    evaluations: int
+
+
+def find_optimum(
+    task: SaccadeTask,
+    start: Fixation,
+    target: Array,
+    random: np.random.Generator,
+    *,
+    population: int = 36,
+    generations: int = 50,
+    progress: Callable[[float], None] | None = None,
+) -> Optimum:
+    """Search the best action of each saccade.
+
+    Args:
+        task: plant, command and reward.
+        start: where each saccade begins, of (saccades,).
+        target: desired orientations, (saccades, 4).
+        random: generator of the search.
+        population: candidates a saccade, a multiple of 3.
+        generations: of the search.
+        progress: called with the share of the work done, 0 to 1.
+    """
+    if population % _ISLANDS or population < 4 * _ISLANDS:
+        raise InputError(f"the population must be a multiple of {_ISLANDS} and at least {4 * _ISLANDS}, got {population}")
+    saccades, driven = len(target), len(task.driven)
+    low, high = task.action_low.ravel(), task.action_high.ravel()
+    rows = np.repeat(np.arange(saccades), population)
+    many_starts, many_targets = start[rows], target[rows]
+
+    def judge(candidates: Array) -> Array:
+        actions = (low + candidates * (high - low)).reshape(-1, driven, 3)
+        return task.perform(many_starts, actions, many_targets).reward.total.reshape(saccades, population)
+
+    x = _spread(random, (saccades, population, low.size))
+    # Half of the candidates end near the target: the rest of the search is then about B and k0.
+    lands = (task.lands_on(target) - task.action_low[:, 1]) / (task.action_high - task.action_low)[:, 1]
+    near = random.normal(lands[:, None], 0.003, (saccades, population // 2, driven))
+    x[:, : population // 2, 1::3] = np.clip(near, 0, 1)
+    # Islands begin in one stratum of k0 each and breed among themselves, so that the basins on both
+    # sides of the cliff stay alive until each is known for what it is worth.
+    island = np.arange(population) % _ISLANDS
+    x[..., 2::3] = (x[..., 2::3] + island[:, None]) / _ISLANDS
+    value = judge(x)
+    mates = np.array([np.flatnonzero(island == i) for i in island])
+    each, columns = np.arange(saccades)[:, None], np.arange(population)
+    for generation in range(generations):
+        if generation == round(_MERGE * generations):
+            mates = np.tile(columns, (population, 1))
+        best = np.take_along_axis(mates[None], value[:, mates].argmax(axis=2)[..., None], axis=2)[..., 0]
+        chosen = random.integers(mates.shape[1], size=(2, saccades, population))
+        one, two = mates[columns, chosen[0]], mates[columns, chosen[1]]
+        # "current to best / 1 / bin", with a scale drawn anew for each candidate.
+        scale = random.uniform(0.3, 0.9, (saccades, population, 1))
+        mutant = np.clip(x + scale * (x[each, best] - x) + scale * (x[each, one] - x[each, two]), 0, 1)
+        crossed = random.random(x.shape) < 0.9
+        crossed[each, columns, random.integers(low.size, size=(saccades, population))] = True
+        trial = np.where(crossed, mutant, x)
+        trial_value = judge(trial)
+        better = trial_value >= value
+        x, value = np.where(better[..., None], trial, x), np.where(better, trial_value, value)
+        if progress:
+            progress((generation + 1) / generations)
+    winner = value.argmax(axis=1)
+    action = low + x[np.arange(saccades), winner] * (high - low)
+    return Optimum(
+        action.reshape(saccades, driven, 3), value.max(axis=1), saccades * population * (generations + 1)
+    )
+
+
+def _spread(random: np.random.Generator, shape: tuple[int, int, int]) -> Array:
+    """Latin hypercube samples in the unit box, one design a saccade."""
+    saccades, population, size = shape
+    cells = random.permuted(np.broadcast_to(np.arange(population)[:, None], (saccades, population, size)), axis=1)
+    return (cells + random.random(shape)) / population

@@ -1,0 +1,86 @@
+"""Where an eye comes to rest: Newton's method on the torque, a batch at a time."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from orient_eye.errors import InputError
+from orient_eye.rotations import FORWARD, rotation
+
+Array = NDArray[np.float64]
+Torque = Callable[[Array, Array], Array]
+"""Torque [N m] (n, 3) on an eye at rest in orientations (n, 4) with motors [deg] at (n, motors)."""
+
+_STEP = 1e-6  # rad, of the difference quotients
+_TOLERANCE = 1e-12  # N m; a degree is worth about 5e-3
+_ITERATIONS = 40
+
+
+def rest_orientation(torque: Torque, motor: Array) -> Array:
+    """Orientations (n, 4) without torque at motor positions [deg] (n, motors).
+
+    Raises:
+        InputError: no equilibrium was found from straight ahead.
+    """
+    motor = np.asarray(motor, dtype=float)
+    # Along a path from zero, so that Newton's method stays on the branch the eye would follow.
+    parts = max(1, int(np.ceil(np.abs(motor).max(initial=0.0) / 40.0)))
+    orientation = np.tile(FORWARD, (len(motor), 1))
+    for part in range(1, parts + 1):
+        orientation = _newton_orientation(torque, motor * part / parts, orientation)
+    return orientation
+
+
+def _newton_orientation(torque: Torque, motor: Array, orientation: Array) -> Array:
+    for _ in range(_ITERATIONS):
+        residual = torque(orientation, motor)
+        if np.abs(residual).max(initial=0.0) < _TOLERANCE:
+            return orientation
+        columns = []
+        for axis in np.eye(3):
+            turned = Rotation.from_rotvec(_STEP * axis) * rotation(orientation)
+            columns.append((torque(turned.as_quat(scalar_first=True), motor) - residual) / _STEP)
+        change = -np.linalg.solve(np.stack(columns, axis=-1), residual[..., None])[..., 0]
+        size = np.linalg.norm(change, axis=-1, keepdims=True)
+        change *= np.minimum(1, 0.7 / np.maximum(size, 1e-300))
+        orientation = (Rotation.from_rotvec(change) * rotation(orientation)).as_quat(scalar_first=True)
+    if np.abs(residual).max() < 1e-9:  # as near as the difference quotients come
+        return orientation
+    worst = int(np.abs(residual).max(axis=-1).argmax())
+    raise InputError(f"no equilibrium found for motors at {np.round(motor[worst], 2).tolist()} deg; turn them less far")
+
+
+def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int], limit: Array) -> Array:
+    """Motor positions [deg] (n, motors) that hold orientations (n, 4), the others at 0.
+
+    Gauss-Newton over the driven motors, inside limit (motors, 2) [deg].
+
+    Raises:
+        InputError: an orientation that these motors cannot hold.
+    """
+    orientation = np.asarray(orientation, dtype=float)
+    motor = np.zeros((len(orientation), motors))
+    step = np.rad2deg(_STEP)
+    for _ in range(_ITERATIONS):
+        residual = torque(orientation, motor)
+        columns = []
+        for index in driven:
+            moved = motor.copy()
+            moved[:, index] += step
+            columns.append((torque(orientation, moved) - residual) / step)
+        slope = np.stack(columns, axis=-1)
+        normal = np.swapaxes(slope, -1, -2)
+        change = -np.linalg.solve(normal @ slope, normal @ residual[..., None])[..., 0]
+        motor[:, driven] = np.clip(motor[:, driven] + np.clip(change, -20, 20), *limit[driven].T)
+        if np.abs(change).max(initial=0.0) < 1e-10:
+            break
+    residual = np.abs(torque(orientation, motor)).max(axis=-1, initial=0.0)
+    if (residual > 1e-7).any():
+        worst = int(residual.argmax())
+        raise InputError(
+            f"orientation {np.round(orientation[worst], 4).tolist()} (w, x, y, z) is no equilibrium of motors "
+            f"{[i + 1 for i in driven]} within their range: choose one they can hold"
+        )
+    return motor

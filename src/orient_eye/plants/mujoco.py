@@ -1,0 +1,184 @@
+"""The whole eye in MuJoCo, batched on the CPU with MuJoCo's own thread pool.
+
+    plant = MujocoPlant()                            # the thesis' integrator, 1 ms
+    plant = MujocoPlant(accurate=True)               # ten steps of 0.1 ms a sample
+
+The thesis' integrator holds each row of the command for one step; the accurate setting runs a
+straight line between rows. Results do not depend on the number of threads.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+from orient_eye import eye as eyes
+from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, check_command, check_start, equilibrium
+from orient_eye.rotations import rotation
+from orient_eye.trajectory import EyeState, Trajectory
+
+Array = NDArray[np.float64]
+_ACCURATE_SUBSTEPS = 10
+_RECORD_BYTES = 64e6  # of one chunk of saccades: stays near the caches, and bounds the memory
+
+
+class MujocoPlant:
+    """The elastic eye of `eye_mjcf/eye3.xml` as a plant; see `orient_eye.plants.Plant`.
+
+    Args:
+        eye: preset, one of `orient_eye.eye.EYES`.
+        accurate: integrate at 0.1 ms instead of the thesis' 1 ms.
+        gravity: add the gravity torque (thesis 3.8), off in the thesis' runs.
+        threads: of the batch; 0 for one a core.
+    """
+
+    name = "mujoco"
+    step_s = 0.001
+
+    def __init__(
+        self, eye: str = "thesis", *, accurate: bool = False, gravity: bool = False, threads: int = 0
+    ) -> None:
+        self.options = {"eye": eye, "accurate": accurate, "gravity": gravity}
+        self.threads = threads
+        self.substeps = _ACCURATE_SUBSTEPS if accurate else 1
+        self.model = eyes.build_model(eye, step_s=self.step_s / self.substeps, gravity=gravity, visual=False)
+        self.motors = eyes.motor_names(self.model)
+        self.motor_range_deg = eyes.motor_range_deg(self.model)
+        self.action_range_deg = np.clip(self.motor_range_deg, -ELASTIC_ACTION_RANGE_DEG, ELASTIC_ACTION_RANGE_DEG)
+        self.tendons = tuple(self.model.tendon(i).name for i in range(self.model.ntendon))
+        self._model_hash = eyes.model_hash(self.model)
+        # Sensors are for the viewer; here the same quantities are recorded directly.
+        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
+        eye_joint = self.model.joint("eye")
+        self._eye_qpos = eye_joint.qposadr[0] + np.arange(4)
+        self._eye_qvel = eye_joint.dofadr[0] + np.arange(3)
+        hinges = [self.model.joint(self.model.actuator(name).trnid[0]) for name in self.motors]
+        self._motor_qpos = np.array([hinge.qposadr[0] for hinge in hinges])
+        self._motor_ctrl = np.array([self.model.actuator(name).id for name in self.motors])
+        self._batches: dict[str, Batch] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.options, "threads": self.threads}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state)  # type: ignore[misc]  # models and batches are rebuilt in the process
+
+    def identity(self) -> dict[str, Any]:
+        """Name, options and hash of the compiled model."""
+        return {"plant": self.name, **self.options, "model": self._model_hash}
+
+    def simulate(self, command: Array, start: EyeState | None = None) -> Trajectory:
+        """Run a batch of saccades; see `orient_eye.plants.Plant.simulate`."""
+        command = check_command(self, command)
+        finite = np.isfinite(command).all(axis=(1, 2))
+        motor = np.where(finite[:, None, None], command, 0.0)
+        if start is None:
+            start = EyeState(self.rest_orientation(motor[:, 0]))
+        orientation, velocity = check_start(start, len(command))
+        finite &= np.isfinite(orientation).all(axis=1) & np.isfinite(velocity).all(axis=1)
+        orientation[~finite], velocity[~finite] = [1, 0, 0, 0], 0
+
+        saccades, samples = command.shape[:2]
+        result = Trajectory(
+            time=self.step_s * np.arange(samples),
+            orientation=np.empty((saccades, samples, 4)),
+            angular_velocity=np.empty((saccades, samples, 3)),
+            motor=motor,
+            tension=np.empty((saccades, samples, len(self.tendons))),
+            failed=~finite,
+            motor_names=self.motors,
+            tendon_names=self.tendons,
+        )
+        for part in self._chunks(saccades, samples):
+            self._run(part, motor, orientation, velocity, result)
+        for array in (result.orientation, result.angular_velocity, result.motor, result.tension):
+            assert array is not None
+            array[result.failed] = np.nan
+        return result
+
+    def _chunks(self, saccades: int, samples: int) -> Iterator[slice]:
+        row = 8 * (self.model.nq + self.model.nv + self.model.ntendon + self.model.nu)
+        size = max(1, int(_RECORD_BYTES / (row * samples * self.substeps)))
+        for first in range(0, saccades, size):
+            yield slice(first, min(first + size, saccades))
+
+    def _batch(self, use: str, size: int) -> Batch:
+        """A batch of that size, kept for the next call of the same use."""
+        batch = self._batches.get(use)
+        if batch is None or batch.nsim != size:
+            batch = self._batches[use] = Batch(self.model, size, self.threads)
+        return batch
+
+    def _run(self, part: slice, motor: Array, orientation: Array, velocity: Array, result: Trajectory) -> None:
+        command = np.deg2rad(motor[part])
+        size, samples = command.shape[:2]
+        batch = self._batch("simulate", size)
+        # Everything fresh: state, controls, warm start, warnings.
+        batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
+        batch.warning[:] = 0
+        batch.qpos[:, self._eye_qpos] = orientation[part]
+        batch.qpos[:, self._motor_qpos] = command[:, 0]
+        eye_frame = rotation(orientation[part]).inv().apply(np.deg2rad(velocity[part]))
+        batch.qvel[:, self._eye_qvel] = eye_frame
+
+        assert result.tension is not None
+        lengths = batch.bind("ten_length")
+        start_qpos, start_qvel = batch.qpos.copy(), batch.qvel.copy()
+        steps = (samples - 1) * self.substeps
+        if steps:
+            # An arm stands where ctrl says one step later, so each step is sent the next instant.
+            record = batch.rollout(steps, self._control(command), record=("qpos", "qvel", "ten_length"))
+            qpos = np.concatenate([start_qpos[:, None], record["qpos"][:, self.substeps - 1 :: self.substeps]], axis=1)
+            qvel = np.concatenate([start_qvel[:, None], record["qvel"][:, self.substeps - 1 :: self.substeps]], axis=1)
+            before_step = record["ten_length"][:, :: self.substeps]
+        else:
+            qpos, qvel, before_step = start_qpos[:, None], start_qvel[:, None], np.empty((size, 0, len(self.tendons)))
+        diverged = (batch.warning > 0).reshape(size, -1).any(axis=1) | ~np.isfinite(qpos).all(axis=(1, 2))
+        batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
+        result.failed[part] |= diverged
+        result.orientation[part] = qpos[..., self._eye_qpos]
+        result.angular_velocity[part] = _to_head_frame(qpos[..., self._eye_qpos], qvel[..., self._eye_qvel])
+        result.tension[part] = eyes.tendon_tension(
+            self.model, np.concatenate([before_step, lengths[:, None]], axis=1)
+        )
+
+    def _control(self, command: Array) -> Array:
+        """Controls [rad] (saccades, steps, nu) that put the arms on the command."""
+        saccades, samples = command.shape[:2]
+        steps = (samples - 1) * self.substeps
+        control = np.zeros((saccades, steps, self.model.nu))
+        if self.substeps == 1:
+            control[..., self._motor_ctrl] = command[:, 1:]
+        else:
+            for i in range(self.substeps):
+                share = (i + 1) / self.substeps
+                between = (1 - share) * command[:, :-1] + share * command[:, 1:]
+                control[:, i :: self.substeps, self._motor_ctrl] = between
+        return control
+
+    def _torque(self, orientation: Array, motor: Array) -> Array:
+        batch = self._batch("torque", len(orientation))  # nothing but qpos ever changes in this one
+        batch.qpos[:, self._eye_qpos] = orientation
+        batch.qpos[:, self._motor_qpos] = np.deg2rad(motor)
+        passive, actuated = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
+        batch.forward()
+        in_eye_frame = (passive + actuated)[:, self._eye_qvel]
+        return rotation(orientation).apply(in_eye_frame)
+
+    def rest_orientation(self, motor: Array) -> Array:
+        """Orientations in which the eye rests; see `orient_eye.plants.Plant`."""
+        return equilibrium.rest_orientation(self._torque, motor)
+
+    def rest_motor(self, orientation: Array, driven: tuple[str, ...]) -> Array:
+        """Motor positions that hold these orientations; see `orient_eye.plants.Plant`."""
+        index = [self.motors.index(name) for name in driven]
+        return equilibrium.rest_motor(self._torque, orientation, len(self.motors), index, self.motor_range_deg)
+
+
+def _to_head_frame(orientation: Array, velocity: Array) -> Array:
+    """Angular velocities [deg/s] in the head frame, from the eye's own frame [rad/s]; both (n, time, ...)."""
+    flat = rotation(orientation.reshape(-1, 4)).apply(velocity.reshape(-1, 3))
+    return np.rad2deg(flat).reshape(velocity.shape)

@@ -1,0 +1,144 @@
+"""The thesis' simulator (its Algorithm 2) in plain NumPy: an independent witness of the MuJoCo eye.
+
+It shares only the numbers of the MJCF with the MuJoCo plant: torque, integration and frames are
+written from the thesis' equations 3.1 to 3.12, a batch at a time.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from orient_eye import eye as eyes
+from orient_eye.eye import STANDARD_GRAVITY, Elastics
+from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, check_command, check_start, equilibrium
+from orient_eye.rotations import rotation
+from orient_eye.trajectory import EyeState, Trajectory
+
+Array = NDArray[np.float64]
+STATIC_FRICTION = 0.006
+"""N m, in the author's program, while the eye turns slower than `STATIC_SPEED`."""
+STATIC_SPEED = 1e-5
+"""rad/s."""
+
+
+class TavaresPlant:
+    """The reference simulator as a plant; see `orient_eye.plants.Plant`.
+
+    Args:
+        eye: preset, one of `orient_eye.eye.EYES`.
+        gravity: add the gravity torque (thesis 3.8).
+        static_friction: hold the eye still while the other torques stay below 0.006 N m, as the author's
+            program does; without it friction is viscous only (3.7).
+        gyroscopic: include the term omega x I omega of a full rigid body, as MuJoCo does; False for the
+            thesis' equations to the letter, which leave it out (at most 0.006 deg on the author's runs).
+    """
+
+    name = "tavares"
+    step_s = 0.001
+
+    def __init__(
+        self, eye: str = "thesis", *, gravity: bool = False, static_friction: bool = False, gyroscopic: bool = True
+    ) -> None:
+        self.options = {
+            "eye": eye,
+            "gravity": gravity,
+            "static_friction": static_friction,
+            "gyroscopic": gyroscopic,
+        }
+        model = eyes.build_model(eye, step_s=self.step_s, visual=False)
+        self.elastics = Elastics.from_model(model)
+        self.motors = eyes.motor_names(model)
+        self.motor_range_deg = eyes.motor_range_deg(model)
+        self.tendons = tuple(model.tendon(i).name for i in range(model.ntendon))
+        self.action_range_deg = np.clip(self.motor_range_deg, -ELASTIC_ACTION_RANGE_DEG, ELASTIC_ACTION_RANGE_DEG)
+        self._model_hash = eyes.model_hash(model)
+
+    def identity(self) -> dict[str, Any]:
+        """Name, options and hash of the model the numbers come from."""
+        return {"plant": self.name, **self.options, "model": self._model_hash}
+
+    def elastic_torque(self, turn: Array, motor: Array) -> tuple[Array, Array]:
+        """Torque of the elastics [N m] (n, 3) and their tension [N] (n, tendons); 3.2 to 3.5.
+
+        Args:
+            turn: rotation matrices of the eye, (n, 3, 3).
+            motor: positions [deg], (n, motors).
+        """
+        e = self.elastics
+        angle = np.deg2rad(motor)
+        arm = Rotation.from_rotvec((angle[..., None] * e.arm_axis).reshape(-1, 3)).as_matrix()
+        arm = arm.reshape(*angle.shape, 3, 3)
+        end = np.einsum("ntij,tj->nti", arm[:, e.motor], e.arm_end) + e.arm_centre[e.motor]
+        insertion = np.einsum("nij,tj->nti", turn, e.insertion)
+        pulled_to = np.where(np.isnan(e.via), end, e.via)
+        span = pulled_to - insertion
+        distance = np.linalg.norm(span, axis=-1)
+        length = distance + np.linalg.norm(end - pulled_to, axis=-1)
+        tension = e.stiffness * np.maximum(length - e.rest_length, 0)
+        force = (tension / distance)[..., None] * span
+        return np.cross(insertion, force).sum(axis=1), tension
+
+    def _torque(self, orientation: Array, motor: Array) -> Array:
+        """All torques on an eye at rest but friction, [N m], (n, 3)."""
+        turn = rotation(orientation).as_matrix()
+        torque, _ = self.elastic_torque(turn, motor)
+        return torque + self._gravity_torque(turn)
+
+    def _gravity_torque(self, turn: Array) -> Array:
+        if not self.options["gravity"]:
+            return np.zeros((len(turn), 3))
+        weight = np.array([0, 0, -self.elastics.mass * STANDARD_GRAVITY])
+        return np.cross(turn @ self.elastics.centre_of_mass, weight)
+
+    def simulate(self, command: Array, start: EyeState | None = None) -> Trajectory:
+        """Run a batch of saccades; see `orient_eye.plants.Plant.simulate`."""
+        command = check_command(self, command)
+        finite = np.isfinite(command).all(axis=(1, 2))
+        motor = np.where(finite[:, None, None], command, 0.0)
+        if start is None:
+            start = EyeState(self.rest_orientation(motor[:, 0]))
+        orientation, velocity = check_start(start, len(command))
+        saccades, samples = command.shape[:2]
+        out_q, out_w = np.empty((saccades, samples, 4)), np.empty((saccades, samples, 3))
+        out_t = np.empty((saccades, samples, len(self.tendons)))
+        q, omega = orientation, np.deg2rad(velocity)
+        for k in range(samples):
+            turn = rotation(q).as_matrix()
+            torque, tension = self.elastic_torque(turn, motor[:, k])
+            out_q[:, k], out_w[:, k], out_t[:, k] = q, np.rad2deg(omega), tension
+            q, omega = self._advance(turn, q, omega, torque + self._gravity_torque(turn))
+        failed = ~finite | ~np.isfinite(out_q).all(axis=(1, 2))
+        for array in (out_q, out_w, out_t, motor):
+            array[failed] = np.nan
+        return Trajectory(
+            self.step_s * np.arange(samples), out_q, out_w, motor, out_t, failed, self.motors, self.tendons
+        )
+
+    def _advance(self, turn: Array, q: Array, omega: Array, torque: Array) -> tuple[Array, Array]:
+        """One step of Algorithm 2: omega first, then q with the new omega."""
+        h = self.step_s
+        inertia = turn @ self.elastics.inertia @ np.swapaxes(turn, -1, -2)  # R I R^T, not the R^T I R of 3.10
+        resisted = torque - self.elastics.friction * omega
+        if self.options["static_friction"]:
+            still = np.linalg.norm(omega, axis=-1) < STATIC_SPEED
+            weak = np.linalg.norm(torque, axis=-1) < STATIC_FRICTION
+            resisted = np.where((still & weak)[:, None], 0, resisted)
+        if self.options["gyroscopic"]:
+            resisted = resisted - np.cross(omega, (inertia @ omega[..., None])[..., 0])
+        omega = omega + h * np.linalg.solve(inertia, resisted[..., None])[..., 0]
+        rate = np.concatenate(  # 1/2 (0, omega) q
+            [-(omega * q[:, 1:]).sum(axis=-1, keepdims=True), q[:, :1] * omega + np.cross(omega, q[:, 1:])], axis=-1
+        )
+        q = q + 0.5 * h * rate
+        return q / np.linalg.norm(q, axis=-1, keepdims=True), omega
+
+    def rest_orientation(self, motor: Array) -> Array:
+        """Orientations in which the eye rests; see `orient_eye.plants.Plant`."""
+        return equilibrium.rest_orientation(self._torque, motor)
+
+    def rest_motor(self, orientation: Array, driven: tuple[str, ...]) -> Array:
+        """Motor positions that hold these orientations; see `orient_eye.plants.Plant`."""
+        index = [self.motors.index(name) for name in driven]
+        return equilibrium.rest_motor(self._torque, orientation, len(self.motors), index, self.motor_range_deg)

@@ -1,0 +1,96 @@
+"""A run leaves a directory that explains itself.
+
+    run = RunDirectory.create(Path("runs/my-run"), "train", config, seed=0)
+    run.path / "anything"                            # files of the run
+    run.write_json("result.json", result)
+
+`run.json` holds the command, the resolved configuration, the seed and the versions of everything
+that computes.
+"""
+
+import json
+import platform
+import shlex
+import sys
+from dataclasses import asdict, dataclass, is_dataclass
+from datetime import datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from orient_eye.errors import InputError
+from orient_eye.files import write_text
+
+_PACKAGES = ("orient-eye", "mujoco", "numpy", "scipy", "gymnasium", "stable-baselines3", "torch", "rerun-sdk")
+
+
+@dataclass(frozen=True)
+class RunDirectory:
+    """The directory of one run."""
+
+    path: Path
+
+    @classmethod
+    def create(
+        cls, path: Path | None, command: str, config: Any, *, seed: int | None = None
+    ) -> "RunDirectory":
+        """Make the directory and write `run.json`.
+
+        Args:
+            path: where; None for runs/COMMAND-DATE-TIME.
+            command: name of the command.
+            config: resolved configuration, a dataclass or a dictionary of plain values.
+            seed: of all random generators, None where nothing is random.
+
+        Raises:
+            InputError: the directory holds something already.
+        """
+        path = path or Path("runs") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
+        if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            raise InputError(f"{path} exists and is not an empty folder; name another with --out, or move it away")
+        path.mkdir(parents=True, exist_ok=True)
+        run = cls(path)
+        settings = asdict(config) if is_dataclass(config) and not isinstance(config, type) else config
+        run.write_json(
+            "run.json",
+            {
+                "command": command,
+                "command_line": shlex.join(sys.argv),
+                "started": datetime.now().astimezone().isoformat(timespec="seconds"),
+                "seed": seed,
+                "config": settings,
+                "versions": versions(),
+            },
+        )
+        return run
+
+    def write_json(self, name: str, content: Any) -> Path:
+        """Write a JSON file of the run."""
+        return write_text(self.path / name, json.dumps(content, indent=2, default=plain) + "\n")
+
+    def read_json(self, name: str) -> Any:
+        """Read a JSON file of the run.
+
+        Raises:
+            InputError: it is missing or is not JSON.
+        """
+        try:
+            return json.loads((self.path / name).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise InputError(f"{self.path} is no run directory: cannot read {name} ({error})") from error
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, the platform and the packages that compute."""
+    found = {"python": platform.python_version(), "platform": platform.platform()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def plain(value: Any) -> Any:
+    """numpy and path values for JSON."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)

@@ -1,0 +1,146 @@
+"""What a plant returns: a batch of saccades over time, and its files.
+
+    trajectory = plant.simulate(command)            # command (saccades, time, motors) [deg]
+    trajectory.yaw_deg                              # (saccades, time)
+    trajectory.save_npz("saccades.npz"); trajectory[3].to_csv("fourth.csv")
+
+The .npz is the durable record: arrays named as the attributes, and nothing that needs pickle.
+"""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orient_eye import rotations
+from orient_eye.errors import InputError
+from orient_eye.files import write_atomically
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EyeState:
+    """Where saccades start.
+
+    Attributes:
+        orientation: unit quaternion w, x, y, z, (saccades, 4).
+        angular_velocity: head frame [deg/s], (saccades, 3); None for an eye at rest.
+    """
+
+    orientation: Array
+    angular_velocity: Array | None = None
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A batch of saccades; the first axis is always the saccade.
+
+    Attributes:
+        time: [s], (time,), from 0.
+        orientation: unit quaternion w, x, y, z, eye to head, (saccades, time, 4).
+        angular_velocity: head frame [deg/s], (saccades, time, 3).
+        motor: motor positions [deg], (saccades, time, motors).
+        tension: of the elastics [N], (saccades, time, tendons); None where the plant has none.
+        failed: (saccades,), True where the simulation diverged or its command was not finite. All
+            numbers of such a saccade are NaN; the others are not touched by it.
+        motor_names: (motors,).
+        tendon_names: (tendons,).
+    """
+
+    time: Array
+    orientation: Array
+    angular_velocity: Array
+    motor: Array
+    tension: Array | None
+    failed: NDArray[np.bool_]
+    motor_names: tuple[str, ...]
+    tendon_names: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.orientation)
+
+    def __getitem__(self, which: int | slice | NDArray[Any]) -> "Trajectory":
+        """Some of the saccades, still as a batch: an integer gives a batch of one."""
+        if isinstance(which, (int, np.integer)):
+            which = np.array([which])
+        return Trajectory(
+            self.time,
+            self.orientation[which],
+            self.angular_velocity[which],
+            self.motor[which],
+            None if self.tension is None else self.tension[which],
+            self.failed[which],
+            self.motor_names,
+            self.tendon_names,
+        )
+
+    @property
+    def yaw_deg(self) -> Array:
+        """Horizontal orientation [deg], positive to the left, (saccades, time)."""
+        return rotations.to_euler(self.orientation)[0]
+
+    @property
+    def pitch_deg(self) -> Array:
+        """Vertical orientation [deg], positive down, (saccades, time)."""
+        return rotations.to_euler(self.orientation)[1]
+
+    @property
+    def roll_deg(self) -> Array:
+        """Torsion [deg], positive: the upper pole to the right, (saccades, time)."""
+        return rotations.to_euler(self.orientation)[2]
+
+    def save_npz(self, path: str | Path) -> Path:
+        """Write all arrays to an .npz file that opens without pickle."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        if self.tension is None:
+            del arrays["tension"]
+        return write_atomically(path, lambda temporary: np.savez_compressed(temporary, **arrays))
+
+    @classmethod
+    def load_npz(cls, path: str | Path) -> "Trajectory":
+        """Read what `save_npz` wrote.
+
+        Raises:
+            InputError: the file is missing or is not a trajectory.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays: dict[str, Any] = dict(file)
+            names = {k: tuple(map(str, arrays.pop(k))) for k in ("motor_names", "tendon_names")}
+            return cls(tension=arrays.pop("tension", None), **arrays, **names)
+        except (OSError, KeyError, TypeError, ValueError) as error:
+            raise InputError(f"{path} is not a trajectory file (.npz written by orient-eye): {error}") from error
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write a batch of one as a table, one row a sample.
+
+        Columns: t_s; q_w, q_x, q_y, q_z; yaw_deg, pitch_deg, roll_deg; omega_x_deg_s, omega_y_deg_s,
+        omega_z_deg_s; tau1_deg ... (motor positions); tension_NAME_N ... (where there are tendons).
+
+        Raises:
+            InputError: the batch holds more than one saccade.
+        """
+        if len(self) != 1:
+            raise InputError(f"a CSV holds one saccade, this trajectory has {len(self)}; pick one: trajectory[0]")
+        columns = ["t_s", "q_w", "q_x", "q_y", "q_z", "yaw_deg", "pitch_deg", "roll_deg"]
+        columns += [f"omega_{axis}_deg_s" for axis in "xyz"]
+        columns += [motor_column(name) for name in self.motor_names]
+        euler = [angle[0] for angle in rotations.to_euler(self.orientation)]
+        data = [self.time, *self.orientation[0].T, *euler, *self.angular_velocity[0].T, *self.motor[0].T]
+        if self.tension is not None:
+            columns += [f"tension_{name}_N" for name in self.tendon_names]
+            data += [*self.tension[0].T]
+        return write_atomically(
+            path,
+            lambda temporary: np.savetxt(
+                temporary, np.column_stack(data), fmt="%.9g", delimiter=",", header=",".join(columns), comments=""
+            ),
+        )
+
+
+def motor_column(motor: str) -> str:
+    """Name of a motor's column in tables: tau2_deg for motor2."""
+    return f"tau{motor.removeprefix('motor')}_deg"

@@ -1,0 +1,304 @@
+"""Facts of the eye: the MJCF, its presets, and what `orient_eye.eye` reads from them."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from orient_eye.errors import InputError
+from orient_eye.eye import (
+    EYES,
+    STANDARD_GRAVITY,
+    Elastics,
+    build_model,
+    model_hash,
+    motor_names,
+    motor_range_deg,
+    tendon_tension,
+)
+from orient_eye.plants import Plant
+from orient_eye.plants.mujoco import MujocoPlant
+from orient_eye.plants.tavares import TavaresPlant
+from orient_eye.resources import data_folder
+from orient_eye.rotations import rotation, to_euler
+
+Array = NDArray[np.float64]
+MOTORS = ("motor1", "motor2", "motor3")
+TENDONS = ("motor1_upper", "motor1_lower", "motor2_right", "motor2_left", "motor3_upper", "motor3_lower")
+SCRIPT = Path(__file__).parents[1] / "scripts" / "make_meshes.py"
+
+# Source: the thesis author's published simulator, see docs/eye.md. In the order of TENDONS: E1, E2, E3, E4, E5, E6.
+INSERTION_YZ = [
+    [0.05302, 0.05302],
+    [0.05302, -0.05302],
+    [-0.07498, 0],
+    [0.07498, 0],
+    [-0.05302, 0.05302],
+    [-0.05302, -0.05302],
+]
+NO_VIA = [np.nan] * 3
+VIA = [[-0.2055, 0, 0.0525], [-0.2055, 0, -0.0525], NO_VIA, NO_VIA, [-0.2055, 0, 0.0525], [-0.2055, 0, -0.0525]]
+ARM_END = [[0, 0, 0.1], [0, 0, -0.1], [0, -0.14, 0], [0, 0.14, 0], [0, 0, 0.1], [0, 0, -0.1]]
+ARM_CENTRE = [[-0.436, -0.0835, 0], [-0.323, 0, 0], [-0.436, 0.0835, 0]]
+REST_LENGTH = [0.36, 0.36, 0.24, 0.24, 0.36, 0.36]
+TENSION_PER_STRETCH = 6.0
+INSERTION_X = {"thesis": 0.007, "eve_v3": -0.007}
+MOTOR3_AXIS = {"thesis": [0, 1, 0], "eve_v3": [0, -1, 0]}
+INERTIA = {
+    "thesis": np.diag([4.759e-5, 4.316e-5, 3.956e-5]),
+    "eve_v3": np.array([[4.759e-4, -1e-7, 1.11e-5], [-1e-7, 4.316e-4, 0], [1.11e-5, 0, 3.956e-4]]),
+}
+
+
+def pose(model: mujoco.MjModel, seed: int = 0) -> mujoco.MjData:
+    """The eye turned and turning, the arms turned, all by chance."""
+    rng = np.random.default_rng(seed)
+    data = mujoco.MjData(model)
+    data.joint("eye").qpos = Rotation.random(rng=rng).as_quat(scalar_first=True)
+    data.joint("eye").qvel = rng.normal(size=3)
+    for name in MOTORS:
+        data.joint(name).qpos = rng.uniform(-0.5, 0.5)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+@pytest.fixture(params=EYES)
+def preset(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def test_motors_are_the_three_actuators_with_limits(preset: str) -> None:
+    model = build_model(preset)
+    assert motor_names(model) == MOTORS
+    assert model.nu == 3
+    assert model.actuator_ctrllimited.all()
+    np.testing.assert_allclose(motor_range_deg(model), [[-80, 80]] * 3)
+    for name in MOTORS:
+        assert model.actuator(name).trnid[0] == model.joint(name).id
+
+
+def test_tendons_are_named_by_motor_and_side(preset: str) -> None:
+    model = build_model(preset)
+    assert tuple(model.tendon(i).name for i in range(model.ntendon)) == TENDONS
+
+
+def test_sensors_show_the_state(preset: str) -> None:
+    model = build_model(preset)
+    data = pose(model)
+    eye = data.joint("eye")
+    np.testing.assert_allclose(data.sensor("orientation").data, eye.qpos, atol=1e-12)
+    in_head = rotation(eye.qpos).apply(eye.qvel)  # a ball joint's velocity is in the eye's frame
+    np.testing.assert_allclose(data.sensor("angular_velocity").data, in_head, atol=1e-12)
+    for name in TENDONS:
+        assert data.sensor(f"length_{name}").data[0] == data.tendon(name).length[0]
+    assert model.nsensor == 2 + len(TENDONS)
+
+
+def test_tension_from_the_length_sensors_makes_the_torque(preset: str) -> None:
+    model = build_model(preset)
+    data = pose(model)
+    data.joint("eye").qvel = 0
+    mujoco.mj_forward(model, data)
+    tension = tendon_tension(model, data.ten_length)
+    assert (tension >= 0).all()
+    elastics = Elastics.from_model(model)
+    turn = rotation(data.joint("eye").qpos)
+    torque = np.zeros(3)
+    for i in range(len(TENDONS)):
+        at = turn.apply(elastics.insertion[i])
+        arm = Rotation.from_rotvec(data.joint(MOTORS[elastics.motor[i]]).qpos[0] * elastics.arm_axis[elastics.motor[i]])
+        end = arm.apply(elastics.arm_end[i]) + elastics.arm_centre[elastics.motor[i]]
+        toward = (end if np.isnan(elastics.via[i]).any() else elastics.via[i]) - at
+        torque += np.cross(at, tension[i] * toward / np.linalg.norm(toward))
+    np.testing.assert_allclose(turn.apply(data.joint("eye").qfrc_passive), torque, atol=1e-12)
+
+
+def test_elastics_are_those_of_the_author(preset: str) -> None:
+    elastics = Elastics.from_model(build_model(preset))
+    insertion = [[INSERTION_X[preset], y, z] for y, z in INSERTION_YZ]
+    np.testing.assert_allclose(elastics.insertion, insertion, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(elastics.insertion, axis=1), 0.0753, atol=2e-5)
+    np.testing.assert_allclose(elastics.via, VIA, atol=1e-15)
+    np.testing.assert_allclose(elastics.arm_end, ARM_END, atol=1e-15)
+    np.testing.assert_allclose(elastics.arm_centre, ARM_CENTRE, atol=1e-15)
+    np.testing.assert_array_equal(elastics.motor, [0, 0, 1, 1, 2, 2])
+    np.testing.assert_array_equal(elastics.arm_axis, [[0, 1, 0], [0, 0, 1], MOTOR3_AXIS[preset]])
+    np.testing.assert_allclose(elastics.rest_length, REST_LENGTH, atol=1e-15)
+    np.testing.assert_allclose(elastics.stiffness, TENSION_PER_STRETCH / np.array(REST_LENGTH), rtol=1e-14)
+    np.testing.assert_allclose(elastics.inertia, INERTIA[preset], atol=1e-18)
+    np.testing.assert_allclose(elastics.centre_of_mass, [0.02, 0, 0])
+    assert elastics.mass == 0.248
+    assert elastics.friction == 0.02
+
+
+def linearised(plant: Plant) -> tuple[Array, Array]:
+    """Restoring stiffness about x, y, z and torque per motor [N m/rad], both (3, 3), at rest."""
+    torque, step, still = plant._torque, 1e-6, np.zeros((3, 3))  # type: ignore[attr-defined]
+    forward = np.tile([1.0, 0, 0, 0], (3, 1))
+    turned = [Rotation.from_rotvec(sign * step * np.eye(3)).as_quat(scalar_first=True) for sign in (1, -1)]
+    moved = [np.rad2deg(sign * step * np.eye(3)) for sign in (1, -1)]
+    stiffness = -(torque(turned[0], still) - torque(turned[1], still)).T / (2 * step)
+    drive = (torque(forward, moved[0]) - torque(forward, moved[1])).T / (2 * step)
+    return stiffness, drive
+
+
+@pytest.mark.parametrize("kind", [TavaresPlant, MujocoPlant])
+def test_eve_v3_linearised_at_rest(kind: type[TavaresPlant] | type[MujocoPlant]) -> None:
+    plant = kind("eve_v3")
+    stiffness, drive = linearised(plant)
+    np.testing.assert_allclose(stiffness, np.diag([0.227, 0.253, 0.501]), atol=5e-4)
+    gain = np.linalg.solve(stiffness, drive)  # rad of eye per rad of motor
+    np.testing.assert_allclose(gain[2], [0, 1.00, 0], atol=5e-3)
+    np.testing.assert_allclose(gain[1], [0.62, 0, -0.62], atol=5e-3)
+
+    elastics = Elastics.from_model(build_model("eve_v3"))
+    inverse = np.linalg.inv(elastics.inertia)
+    matrix = np.block([[np.zeros((3, 3)), np.eye(3)], [-inverse @ stiffness, -inverse * elastics.friction]])
+    poles = np.linalg.eigvals(matrix)
+    poles = np.sort_complex(poles[poles.imag > 0])
+    np.testing.assert_allclose(poles, [-25.3 + 25j, -23.2 + 7.1j, -21.0 + 5.9j], atol=0.06)
+
+
+def test_static_yaw_of_the_thesis_eye() -> None:
+    motor2 = np.array([25, 30, 36, 40, 50, 60, 80])
+    motor = np.column_stack([0 * motor2, motor2, 0 * motor2])
+    yaw, pitch, roll = to_euler(MujocoPlant().rest_orientation(motor))
+    np.testing.assert_allclose(yaw, [37.3, 45.1, 55.0, 61.8, 79.3, 92.4, 105.0], atol=0.06)
+    np.testing.assert_allclose([pitch, roll], 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("step_s", [5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3])
+def test_arms_stand_on_the_command_one_step_later(preset: str, step_s: float) -> None:
+    model = build_model(preset, step_s=step_s)
+    assert model.opt.timestep == step_s
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        data.ctrl[:] = rng.uniform(-0.7, 0.7, 3)
+        mujoco.mj_step(model, data)
+        arms = [data.joint(name).qpos[0] for name in MOTORS]
+        np.testing.assert_allclose(arms, data.ctrl, atol=3e-6)  # 2e-4 deg
+
+
+def test_file_alone_is_the_thesis_preset_at_1_ms() -> None:
+    """What `python -m mujoco.viewer` and any other MuJoCo program opens."""
+    bare = mujoco.MjModel.from_xml_path(str(data_folder("eye_mjcf") / "eye3.xml"))
+    assert model_hash(bare) == model_hash(build_model("thesis", step_s=0.001))
+
+
+def test_gravity_adds_only_the_torque_of_the_centre_of_mass(preset: str) -> None:
+    model, without = build_model(preset, gravity=True), build_model(preset)
+    assert motor_names(model) == motor_names(without) == MOTORS
+    assert model.nu == without.nu + 1
+    np.testing.assert_array_equal(motor_range_deg(model), motor_range_deg(without))
+    for seed in range(5):
+        data, reference = pose(model, seed), pose(without, seed)
+        for name in MOTORS:
+            data.actuator(name).ctrl = reference.actuator(name).ctrl = 0.3
+        data.actuator("gravity").ctrl = 123.0  # no control
+        mujoco.mj_forward(model, data)
+        mujoco.mj_forward(without, reference)
+        turn = rotation(data.joint("eye").qpos)
+        weight = np.array([0, 0, -0.248 * STANDARD_GRAVITY])
+        torque = turn.apply(data.joint("eye").qfrc_actuator)
+        np.testing.assert_allclose(torque, np.cross(turn.apply([0.02, 0, 0]), weight), atol=1e-14)
+        np.testing.assert_array_equal(data.qfrc_passive, reference.qfrc_passive)
+        for name in MOTORS:
+            assert data.actuator(name).ctrl[0] == 0.3
+            assert data.joint(name).qfrc_actuator[0] == reference.joint(name).qfrc_actuator[0]
+
+
+def test_unknown_preset_names_the_known_ones() -> None:
+    with pytest.raises(InputError, match=r"'tesis'.*thesis.*eve_v3"):
+        build_model("tesis")
+
+
+@pytest.mark.parametrize("step_s", [0.0, -0.001, float("nan"), float("inf"), 0.05])
+def test_bad_step_is_refused(step_s: float) -> None:
+    with pytest.raises(InputError, match="between 0 and"):
+        build_model(step_s=step_s)
+
+
+def test_meshes_have_no_part_in_the_physics(preset: str) -> None:
+    model = build_model(preset)
+    assert not model.geom_contype.any()
+    assert not model.geom_conaffinity.any()
+    spec = mujoco.MjSpec.from_file(str(data_folder("eye_mjcf") / "eye3.xml"))
+    EYES[preset](spec)
+    spec.compiler.discardvisual = True
+    bare = spec.compile()
+    assert bare.ngeom == 0
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_armature", "dof_damping"):
+        np.testing.assert_array_equal(getattr(model, field), getattr(bare, field))
+
+
+# --- scripts/make_meshes.py ---------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def make_meshes() -> ModuleType:
+    specification = importlib.util.spec_from_file_location("make_meshes", SCRIPT)
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    sys.modules["make_meshes"] = module  # dataclasses look their module up
+    specification.loader.exec_module(module)
+    return module
+
+
+def triangles(path: Path) -> Array:
+    """Corners (faces, 3, 3) in a binary STL file."""
+    content = path.read_bytes()
+    faces = np.frombuffer(content[84:], dtype=[("numbers", "<f4", 12), ("attribute", "<u2")])
+    assert len(faces) == int.from_bytes(content[80:84], "little")
+    return faces["numbers"].reshape(-1, 4, 3)[:, 1:].astype(float)
+
+
+def test_meshes_are_what_the_script_makes(
+    make_meshes: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make_meshes.main(make_meshes.Options(out=tmp_path))
+    folder = data_folder("eye_mjcf")
+    shipped = sorted(path.name for path in (folder / "meshes").iterdir())
+    used = re.findall(r'file="(\S+)"', (folder / "eye3.xml").read_text(encoding="utf-8"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == shipped == sorted(used)
+    assert sum((folder / "meshes" / name).stat().st_size for name in shipped) < 300_000
+    for name in shipped:
+        made, there = triangles(tmp_path / name), triangles(folder / "meshes" / name)
+        assert made.shape == there.shape
+        np.testing.assert_allclose(made, there, atol=1e-7, err_msg=f"{name}: run scripts/make_meshes.py")
+    text = capsys.readouterr().out
+    assert "no rigid body has these numbers" in text
+
+
+def test_eyeball_carries_the_insertions(make_meshes: ModuleType, preset: str) -> None:
+    insertion = Elastics.from_model(build_model(preset)).insertion
+    corners = triangles(data_folder("eye_mjcf") / "meshes" / "sclera.stl").reshape(-1, 3)
+    assert corners[:, 0].min() < insertion[:, 0].min() - 0.005
+    assert np.linalg.norm(corners, axis=1).max() == pytest.approx(np.linalg.norm(insertion[0]), abs=2e-5)
+
+
+def test_meshes_are_closed() -> None:
+    for path in (data_folder("eye_mjcf") / "meshes").iterdir():
+        mesh = trimesh.load_mesh(path)
+        assert mesh.is_watertight, path.name
+        assert mesh.volume > 0, path.name
+
+
+def test_weight_of_the_shell_agrees_with_its_mesh(make_meshes: ModuleType) -> None:
+    radius, wall, density = 0.0753, 0.003, 1240.0
+    weighed = make_meshes.weigh_shell(radius, wall, density)
+    mesh = make_meshes.shell(radius, wall, rings=60, sections=128)
+    mesh.density = density
+    assert weighed.mass == pytest.approx(mesh.mass, rel=5e-3)
+    np.testing.assert_allclose(weighed.centre_of_mass, mesh.center_mass, atol=1e-4)
+    inertia = mesh.moment_inertia_frame(np.eye(4))  # about the origin
+    np.testing.assert_allclose(np.diag(weighed.inertia), inertia, rtol=5e-3, atol=1e-9)
