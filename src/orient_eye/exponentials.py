@@ -47,7 +47,8 @@ class ExponentialSum:
 
     def integral(self, t: Array) -> Array:
         """Integral from 0 to t."""
-        return sum((x.c[..., None] * t ** (x.n + 1) * _moment(x.n, x.p[..., None] * t) for x in self.terms), np.zeros(()))
+        parts = (x.c[..., None] * t ** (x.n + 1) * _moment(x.n, x.p[..., None] * t) for x in self.terms)
+        return sum(parts, np.zeros(()))
 
     def low_pass(self, w: Array | float, t: Array) -> Array:
         """Response at t, from rest, of the low-pass w / (s + w) to this sum.

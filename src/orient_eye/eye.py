@@ -190,9 +190,9 @@ class Elastics:
             arm_end.append(model.site_pos[on_arm[0]])
             motor.append(arms.index(model.site_bodyid[on_arm[0]]))
             via.append(model.site_pos[fixed[0]] if fixed else np.full(3, np.nan))
-        turned = np.zeros(9)
-        mujoco.mju_quat2Mat(turned, model.body("eye").iquat)
-        turned = turned.reshape(3, 3)
+        flat = np.zeros(9)
+        mujoco.mju_quat2Mat(flat, model.body("eye").iquat)
+        turned = flat.reshape(3, 3)
         return cls(
             insertion=np.array(insertion),
             via=np.array(via),

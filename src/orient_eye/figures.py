@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from orient_eye.sysid.identification import Identification
+    from orient_eye.trajectory import Trajectory
 
 _DATA, _MODEL, _OTHER = "#1f4e9c", "#d1495b", "#2a9d6f"
 _DPI = 130
@@ -45,7 +46,7 @@ def figure_3_5(found: "Identification") -> Figure:
         width = np.where(np.isfinite(width), width, np.nan)
         axes.fill_between(
             amplitude[order], (value - width)[order], (value + width)[order], color=_DATA, alpha=0.12, lw=0,
-            label="95 % interval",
+            label="95 % interval of the fit",
         )  # fmt: skip
         axes.plot(amplitude[order], value[order], "o-", color=_DATA, ms=4, lw=1.2, label="fit of each step")
         axes.axhline(chosen[symbol], color=_MODEL, ls="--", label=f"surrogate: {chosen[symbol]:.4g}")
@@ -80,7 +81,9 @@ def figure_3_6(found: "Identification", shown: Sequence[int] | NDArray[np.intp])
         )  # fmt: skip
     top.plot([], [], color="black", lw=1.6, label="plant")
     top.plot([], [], color=_MODEL, ls="--", lw=1, label=f"surrogate, K = {numbers[0]:.4g}, w0 = {numbers[1]:.4g} rad/s")
-    top.legend(frameon=False, loc="upper left", bbox_to_anchor=(0.25, 1.0))
+    low, high = top.get_ylim()
+    top.set_ylim(low, high + 0.1 * (high - low))
+    top.legend(frameon=False, loc="upper left", ncols=2)
     top.set(ylabel="movement of the eye [deg]", title="Step responses, by amplitude of the motor's step")
     bottom.axhline(0, color="black", lw=0.6)
     bottom.set(xlabel="time [s]", ylabel="plant - surrogate\n[deg]")
@@ -123,3 +126,27 @@ def recorded_steps(found: "Identification") -> Figure:
 def _tidy(axes: "Axes") -> None:
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def draw_trajectory(trajectory: "Trajectory", path: str | Path) -> Path:
+    """The first saccade of a batch over time: motors, orientation, angular velocity, tensions where there are any."""
+    figure = Figure(figsize=(10, 8), layout="constrained")
+    curves: list[tuple[str, dict[str, NDArray[np.float64]]]] = [
+        ("motor [deg]", dict(zip(trajectory.motor_names, trajectory.motor[0].T, strict=True))),
+        (
+            "orientation [deg]",
+            {"yaw": trajectory.yaw_deg[0], "pitch": trajectory.pitch_deg[0], "roll": trajectory.roll_deg[0]},
+        ),
+        ("angular velocity [deg/s]", dict(zip("xyz", trajectory.angular_velocity[0].T, strict=True))),
+    ]
+    if trajectory.tension is not None:
+        curves.append(("tension [N]", dict(zip(trajectory.tendon_names, trajectory.tension[0].T, strict=True))))
+    panels = figure.subplots(len(curves), 1, sharex=True)
+    for axes, (label, lines) in zip(panels, curves, strict=True):
+        for name, values in lines.items():
+            axes.plot(trajectory.time, values, lw=1.4, label=name)
+        axes.set_ylabel(label)
+        _tidy(axes)
+        axes.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    panels[-1].set_xlabel("time [s]")
+    return save(figure, path)

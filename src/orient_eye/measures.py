@@ -106,7 +106,8 @@ def _turn_about(turn: Rotation, start: Array, orientation: Array) -> Array:
     along = np.concatenate([-(v * axis).sum(axis=-1, keepdims=True), w * axis - np.cross(v, axis)], axis=-1)
     sine, cosine = (np.einsum("ntk,nk->nt", orientation, c) for c in (along, start))
     sign = np.where(cosine < 0, -1.0, 1.0)
-    return np.rad2deg(2 * np.arctan2(sign * sine, sign * cosine))
+    angle: Array = np.rad2deg(2 * np.arctan2(sign * sine, sign * cosine))
+    return angle
 
 
 def _measures(

@@ -56,7 +56,7 @@ def find_optimum(
         progress: called with the share of the work done, 0 to 1.
     """
     if population % _ISLANDS or population < 4 * _ISLANDS:
-        raise InputError(f"the population must be a multiple of {_ISLANDS} and at least {4 * _ISLANDS}, got {population}")
+        raise InputError(f"the population must be a multiple of {_ISLANDS}, at least {4 * _ISLANDS}, got {population}")
     saccades, driven = len(target), len(task.driven)
     low, high = task.action_low.ravel(), task.action_high.ravel()
     rows = np.repeat(np.arange(saccades), population)
@@ -97,9 +97,7 @@ def find_optimum(
             progress((generation + 1) / generations)
     winner = value.argmax(axis=1)
     action = low + x[np.arange(saccades), winner] * (high - low)
-    return Optimum(
-        action.reshape(saccades, driven, 3), value.max(axis=1), saccades * population * (generations + 1)
-    )
+    return Optimum(action.reshape(saccades, driven, 3), value.max(axis=1), saccades * population * (generations + 1))
 
 
 def _spread(random: np.random.Generator, shape: tuple[int, int, int]) -> Array:

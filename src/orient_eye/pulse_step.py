@@ -80,7 +80,7 @@ def varying_C(variant: int, step: Array, B: Array, k0: Array, speed_limit: float
         return np.clip(C, _SLOWEST_ONSET * B, 1e5)
     # a (B + C)^2 = W C, with a = |D - F| B / (k0 e) and W = V - |D - F| B
     a, W = size * B / (k0 * np.e), speed_limit - size * B
-    feasible = W > 4 * a * B
+    feasible = 4 * a * B < W
     root = np.sqrt(np.where(feasible, W**2 - 4 * a * B * W, 0.0))
     C = np.where(feasible, 2 * a * B**2 / np.where(feasible, W - 2 * a * B + root, 1.0), B)
     return np.maximum(C, _SLOWEST_ONSET * B)
@@ -121,9 +121,9 @@ class PulseStep:
             object.__setattr__(self, name, array)
             if array.ndim != 2:
                 raise InputError(f"{name} has the shape (saccades, motors), got {array.shape}")
-            if name in ("B", "k0") or (name == "C" and self.variant in FIXED_C):
-                if (array <= 0).any():
-                    raise InputError(f"{name} must be positive, got {array.min():g}")
+            positive = name in ("B", "k0") or (name == "C" and self.variant in FIXED_C)
+            if positive and (array <= 0).any():
+                raise InputError(f"{name} must be positive, got {array.min():g}")
 
     @cached_property
     def shape(self) -> ExponentialSum:

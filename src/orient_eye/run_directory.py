@@ -31,9 +31,7 @@ class RunDirectory:
     path: Path
 
     @classmethod
-    def create(
-        cls, path: Path | None, command: str, config: Any, *, seed: int | None = None
-    ) -> "RunDirectory":
+    def create(cls, path: Path | None, command: str, config: Any, *, seed: int | None = None) -> "RunDirectory":
         """Make the directory and write `run.json`.
 
         Args:

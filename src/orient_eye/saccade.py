@@ -110,11 +110,12 @@ class SaccadeTask:
         return self._bounds(1)
 
     def _bounds(self, end: int) -> Array:
-        D = self.plant.action_range_deg[self._driven, end]
+        D = self.plant.action_range_deg[self.driven_index, end]
         return np.stack([np.full_like(D, B_RANGE[end]), D, np.full_like(D, K0_RANGE[end])], axis=-1)
 
     @property
-    def _driven(self) -> list[int]:
+    def driven_index(self) -> list[int]:
+        """Indices of the driven motors among the plant's."""
         return [self.plant.motors.index(name) for name in self.driven]
 
     def fixate(self, orientation: Array) -> Fixation:
@@ -127,7 +128,7 @@ class SaccadeTask:
 
     def lands_on(self, target: Array) -> Array:
         """D [deg] of each driven motor at which the eye rests on targets (saccades, 4); (saccades, driven)."""
-        return self.plant.rest_motor(target, self.driven)[:, self._driven]
+        return self.plant.rest_motor(target, self.driven)[:, self.driven_index]
 
     def pulse_step(self, start: Fixation, action: Array) -> PulseStep:
         """The motor command of an action.
@@ -137,7 +138,7 @@ class SaccadeTask:
             action: B [1/s], D [deg], k0 [1/s] of each driven motor, (saccades, driven, 3).
         """
         B, D, k0 = (np.asarray(action, float)[..., i] for i in range(3))
-        F = start.motor[:, self._driven]
+        F = start.motor[:, self.driven_index]
         C: ArrayLike | None = None
         if self.variant in FIXED_C:
             fixed = FIXED_C[self.variant] if self.C is None else self.C
@@ -159,7 +160,7 @@ class SaccadeTask:
         else:
             trajectory, saturated = self._simulate(start, command)
             final = start.motor.copy()
-            final[:, self._driven] = command.D
+            final[:, self.driven_index] = command.D
             measures = measure(trajectory, self.plant.rest_orientation(final), band=self.band)
         return Outcome(command, measures, reward(measures, command.energy(), target, self.weights), saturated)
 
@@ -176,7 +177,7 @@ class SaccadeTask:
 
     def _simulate(self, start: Fixation, command: PulseStep) -> tuple[Trajectory, NDArray[np.bool_]]:
         motor = np.repeat(start.motor[:, None], self._samples, axis=1)
-        motor[..., self._driven] = command.sample(self.plant.step_s, self._samples)
+        motor[..., self.driven_index] = command.sample(self.plant.step_s, self._samples)
         low, high = self.plant.motor_range_deg.T
         held = np.clip(motor, low, high)
         saturated = (held != motor).any(axis=(1, 2))

@@ -7,6 +7,7 @@
 The .npz is the durable record: arrays named as the attributes, and nothing that needs pickle.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -109,7 +110,7 @@ class Trajectory:
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays: dict[str, Any] = dict(file)
-            names = {k: tuple(map(str, arrays.pop(k))) for k in ("motor_names", "tendon_names")}
+            names: dict[str, Any] = {k: tuple(map(str, arrays.pop(k))) for k in ("motor_names", "tendon_names")}
             return cls(tension=arrays.pop("tension", None), **arrays, **names)
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"{path} is not a trajectory file (.npz written by orient-eye): {error}") from error
@@ -144,3 +145,27 @@ class Trajectory:
 def motor_column(motor: str) -> str:
     """Name of a motor's column in tables: tau2_deg for motor2."""
     return f"tau{motor.removeprefix('motor')}_deg"
+
+
+def concatenate(parts: Sequence[Trajectory]) -> Trajectory:
+    """One batch from batches of the same plant and the same times.
+
+    Raises:
+        InputError: their times, motors or tendons differ.
+    """
+    first = parts[0]
+    for part in parts[1:]:
+        same = (part.motor_names, part.tendon_names) == (first.motor_names, first.tendon_names)
+        if not same or not np.array_equal(part.time, first.time) or (part.tension is None) != (first.tension is None):
+            raise InputError("only trajectories of the same plant and the same times can be one batch")
+    tension = None if first.tension is None else np.concatenate([p.tension for p in parts if p.tension is not None])
+    return Trajectory(
+        first.time,
+        np.concatenate([p.orientation for p in parts]),
+        np.concatenate([p.angular_velocity for p in parts]),
+        np.concatenate([p.motor for p in parts]),
+        tension,
+        np.concatenate([p.failed for p in parts]),
+        first.motor_names,
+        first.tendon_names,
+    )

@@ -36,7 +36,7 @@ class LowPassPlant:
     def __init__(self, surrogate: Surrogate | str | Path = "thesis", *, step_s: float = 0.001) -> None:
         self.surrogate = surrogate if isinstance(surrogate, Surrogate) else Surrogate.load(surrogate)
         self.step_s = step_s
-        self.motors = (self.surrogate.motor,)
+        self.motors: tuple[str, ...] = (self.surrogate.motor,)
         self.motor_range_deg = np.array([[-np.inf, np.inf]])
         self.action_range_deg = np.array([[-80.0, 80.0]])  # thesis 4.3.1
 
@@ -61,8 +61,7 @@ class LowPassPlant:
         theta[:, 0] = theta0
         drive = K * ((mean - r) * tau[:, :-1] + (1 - mean) * tau[:, 1:])
         theta[:, 1:] = lfilter([1.0], [1.0, -r], drive, axis=1, zi=(r * theta0)[:, None])[0]
-        failed = ~np.isfinite(theta).all(axis=1)
-        return self._trajectory(self.step_s * np.arange(tau.shape[1]), theta, w0 * (K * tau - theta), command, failed)
+        return self._trajectory(self._times(tau.shape[1]), theta, w0 * (K * tau - theta), command)
 
     def respond(self, command: PulseStep) -> "LowPassResponse":
         """Response to pulse-steps, from rest at their F, in closed form."""
@@ -70,13 +69,15 @@ class LowPassPlant:
 
     def trajectory(self, command: PulseStep, samples: int) -> Trajectory:
         """The closed-form response to pulse-steps, sampled."""
-        t = self.step_s * np.arange(samples)
-        response = self.respond(command)
-        yaw, rate = response.yaw(t[None]), response.rate(t[None])
-        return self._trajectory(t, yaw, rate, command.position(t), ~np.isfinite(yaw).all(axis=1))
+        t, response = self._times(samples), self.respond(command)
+        return self._trajectory(t, response.yaw(t[None]), response.rate(t[None]), command.position(t))
 
-    def _trajectory(self, t: Array, yaw: Array, rate: Array, motor: Array, failed: NDArray[np.bool_]) -> Trajectory:
+    def _times(self, samples: int) -> Array:
+        return np.arange(samples) * np.float64(self.step_s)
+
+    def _trajectory(self, t: Array, yaw: Array, rate: Array, motor: Array) -> Trajectory:
         yaw, rate, motor = yaw.copy(), rate.copy(), motor.copy()
+        failed = np.asarray(~np.isfinite(yaw).all(axis=1))
         for array in (yaw, rate, motor):
             array[failed] = np.nan
         velocity = np.stack([np.zeros_like(rate), np.zeros_like(rate), rate], axis=-1)

@@ -1,0 +1,87 @@
+"""Everything a training run needs to go on as if it had never stopped, in one file.
+
+Networks, optimizers, replay buffer, counters and the states of all random generators. The file is written
+whole or not at all, and read with torch's loader of plain tensors, which runs no code.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from orient_eye.environment import SaccadeVecEnv
+from orient_eye.errors import InputError
+from orient_eye.files import write_atomically
+from orient_eye.learning.replay_buffer import OneStepReplayBuffer
+from orient_eye.learning.sac import OneStepSAC
+
+_NAME = "checkpoint.pt"
+
+
+def save_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv, extra: dict[str, Any]) -> Path:
+    """Write the checkpoint of a run between two updates.
+
+    Args:
+        folder: of the run.
+        model: the algorithm.
+        env: its environment.
+        extra: plain values kept beside.
+    """
+    buffer = _buffer(model)
+    content = {
+        "policy": model.policy.state_dict(),
+        "actor_optimizer": model.actor.optimizer.state_dict(),
+        "critic_optimizer": model.critic.optimizer.state_dict(),
+        "rows": torch.from_numpy(buffer.rows[: buffer.size()]),
+        "torch_random": torch.get_rng_state(),
+        "plain": json.dumps(
+            {
+                "buffer_position": buffer.pos,
+                "buffer_full": buffer.full,
+                "timesteps": model.num_timesteps,
+                "updates": model._n_updates,
+                "buffer_random": buffer.random.bit_generator.state,
+                "env_random": env.random.bit_generator.state,
+                "action_random": model.action_space.np_random.bit_generator.state,
+                "env_yaw": [a.tolist() for a in env.yaw_deg],
+                "extra": extra,
+            }
+        ),
+    }
+    return write_atomically(folder / _NAME, lambda temporary: torch.save(content, temporary))
+
+
+def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict[str, Any]:
+    """Put a run back where its checkpoint was taken; returns what was kept beside.
+
+    Raises:
+        InputError: there is no checkpoint, or it does not fit.
+    """
+    try:
+        content = torch.load(folder / _NAME, weights_only=True)
+        plain = json.loads(content["plain"])
+        model.policy.load_state_dict(content["policy"])
+        model.actor.optimizer.load_state_dict(content["actor_optimizer"])
+        model.critic.optimizer.load_state_dict(content["critic_optimizer"])
+        buffer = _buffer(model)
+        buffer.rows[: len(content["rows"])] = content["rows"].numpy()
+    except FileNotFoundError as error:
+        raise InputError(f"{folder} has no checkpoint to go on from; start a new run without --resume") from error
+    except (KeyError, ValueError, RuntimeError) as error:
+        raise InputError(f"the checkpoint in {folder} does not fit this version: {error}") from error
+    buffer.pos, buffer.full = plain["buffer_position"], plain["buffer_full"]
+    model.num_timesteps, model._n_updates = plain["timesteps"], plain["updates"]
+    buffer.random.bit_generator.state = plain["buffer_random"]
+    model.action_space.np_random.bit_generator.state = plain["action_random"]
+    model._last_obs = env.begin(*(np.array(yaw) for yaw in plain["env_yaw"]))
+    env.random.bit_generator.state = plain["env_random"]
+    torch.set_rng_state(content["torch_random"])
+    extra: dict[str, Any] = plain["extra"]
+    return extra
+
+
+def _buffer(model: OneStepSAC) -> OneStepReplayBuffer:
+    assert isinstance(model.replay_buffer, OneStepReplayBuffer)
+    return model.replay_buffer

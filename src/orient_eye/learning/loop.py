@@ -1,0 +1,204 @@
+"""What happens between two updates of a training run: progress, metrics, stages, checkpoints, a stop."""
+
+import csv
+import io
+import signal
+import time
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from stable_baselines3.common.callbacks import BaseCallback
+
+from orient_eye.environment import SaccadeVecEnv, observe, to_action
+from orient_eye.files import write_text
+from orient_eye.learning.checkpoint import save_checkpoint
+from orient_eye.learning.evaluation import Yardstick
+from orient_eye.learning.sac import OneStepSAC
+
+Array = NDArray[np.float64]
+STAGES = (0.0, 0.1, 0.25, 0.5, 1.0)
+"""Shares of the training at which evaluation saccades are recorded."""
+_EVALUATIONS = 50  # a run
+_CHECKPOINT_S = 20.0
+
+
+class Stop(Exception):
+    """Unwinds SB3's loop between two updates."""
+
+
+class TrainingLoop(BaseCallback):
+    """Progress, metrics, stages and checkpoints, always between two updates."""
+
+    _FIELDS = (
+        "update", "saccades", "elapsed_s", "reward_mean", "gap_mean", "gap_p95", "temperature", "q_loss", "policy_loss",
+        "failed",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        folder: Path,
+        env: SaccadeVecEnv,
+        updates: int,
+        yardstick: Yardstick,
+        table: Yardstick,
+        bar: Progress,
+        ctrl_c: "CtrlC",
+    ) -> None:
+        super().__init__()
+        self.folder, self.env, self.yardstick, self.table, self.ctrl_c = folder, env, yardstick, table, ctrl_c
+        self.updates = updates
+        self.every = max(1, self.updates // _EVALUATIONS)
+        self.rows: list[dict[str, float]] = []
+        self.rewards: list[float] = []
+        self.failed, self.elapsed = 0, 0.0
+        self.began = self.resumed = self.saved = time.monotonic()
+        self.done_before, self.evaluated = 0, -1
+        self.bar = bar
+        self.job = bar.add_task("training", total=self.updates, note="")
+
+    @property
+    def algorithm(self) -> OneStepSAC:
+        """The one that learns."""
+        assert isinstance(self.model, OneStepSAC)
+        return self.model
+
+    def go_on(self, extra: dict[str, Any]) -> None:
+        """Take up the counters of a checkpoint."""
+        self.rows, self.failed, self.rewards = extra["rows"], extra["failed"], extra["rewards"]
+        self.evaluated = extra["evaluated"]
+        self.began -= extra["elapsed"]
+        self.done_before = extra["updates"]
+
+    def _on_rollout_start(self) -> None:
+        self._between_updates()
+
+    def _on_step(self) -> bool:
+        assert self.env.outcome is not None
+        self.failed += int(self.env.outcome.measures.failed.sum())
+        self.rewards.append(float(self.env.outcome.reward.total.mean()))
+        return True
+
+    def _between_updates(self) -> None:
+        n = self.algorithm._n_updates
+        self.elapsed = time.monotonic() - self.began
+        if n % self.every == 0 and n != self.evaluated:
+            self._evaluate(n)
+        if n % 10 == 0 and self.rows:
+            speed = (n - self.done_before) / max(time.monotonic() - self.resumed, 1e-9)
+            row = self.rows[-1]
+            note = f"reward {row['reward_mean']:.3g}  gap {100 * row['gap_mean']:.2f} %  {speed:.0f} updates/s"
+            self.bar.update(self.job, completed=n, note=note)
+        if self.ctrl_c.pressed:
+            self._save()
+            raise Stop
+        if time.monotonic() - self.saved > _CHECKPOINT_S:
+            self._save()
+
+    def finish(self) -> None:
+        """The last evaluation and checkpoint."""
+        self._between_updates()
+        self._save()
+
+    def _save(self) -> None:
+        extra = {
+            "rows": self.rows, "failed": self.failed, "elapsed": self.elapsed, "updates": self.algorithm._n_updates,
+            "evaluated": self.evaluated, "rewards": self.rewards,
+        }  # fmt: skip
+        save_checkpoint(self.folder, self.algorithm, self.env, extra)
+        self.saved = time.monotonic()
+
+    def _act(self, start: Array, target: Array) -> Array:
+        scaled, _ = self.algorithm.predict(observe(start, target), deterministic=True)
+        return to_action(self.env.task, scaled)
+
+    def _evaluate(self, n: int) -> None:
+        _, _, gap = self.yardstick.perform(self._act)
+        logged = self.algorithm.logger.name_to_value
+        self.rows.append(
+            {
+                "update": n,
+                "saccades": self.num_timesteps,
+                "elapsed_s": round(self.elapsed, 2),
+                "reward_mean": float(np.mean(self.rewards)) if self.rewards else float("nan"),
+                "gap_mean": float(gap.mean()),
+                "gap_p95": float(np.quantile(gap, 0.95)),
+                "temperature": float(logged.get("train/ent_coef", float("nan"))),
+                "q_loss": float(logged.get("train/critic_loss", float("nan"))),
+                "policy_loss": float(logged.get("train/actor_loss", float("nan"))),
+                "failed": self.failed,
+            }
+        )
+        self.rewards = []
+        self.evaluated = n
+        self._write_metrics()
+        for stage in STAGES:
+            if n == self.every * round(stage * self.updates / self.every) or (stage == 1 and n == self.updates):
+                self._record_stage(stage)
+
+    def _record_stage(self, stage: float) -> None:
+        start = self.table.start
+        trajectory = self.env.task.trajectory(start, self._act(start.orientation, self.table.target))
+        trajectory.save_npz(self.folder / "stages" / f"{round(100 * stage):03d}.npz")
+
+    def _write_metrics(self) -> None:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, self._FIELDS)
+        writer.writeheader()
+        writer.writerows(self.rows)
+        write_text(self.folder / "metrics.csv", text.getvalue())
+        self._tensorboard()
+
+    def _tensorboard(self) -> None:
+        try:
+            from torch.utils.tensorboard import SummaryWriter
+        except ImportError:
+            return  # an optional extra
+        if not hasattr(self, "writer"):
+            self.writer = SummaryWriter(str(self.folder / "tensorboard"))
+        row = self.rows[-1]
+        for name in self._FIELDS[3:]:
+            self.writer.add_scalar(name, row[name], int(row["update"]))
+        self.writer.flush()
+
+
+class CtrlC:
+    """Ctrl-C asks for a stop at the next update; pressed again it stops at once."""
+
+    def __init__(self) -> None:
+        self.pressed = False
+
+    def __enter__(self) -> "CtrlC":
+        try:
+            self.before = signal.signal(signal.SIGINT, self._handle)
+        except ValueError:  # not in the main thread: Python's own handler stays
+            self.before = None
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.before is not None:
+            signal.signal(signal.SIGINT, self.before)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self.pressed:
+            raise KeyboardInterrupt
+        self.pressed = True
+
+
+def progress_bar(quiet: bool) -> Progress:
+    """A bar on standard error, or nothing."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=Console(stderr=True),
+        disable=quiet,
+    )

@@ -1,0 +1,260 @@
+"""A training run: from a configuration to a run directory with policy, metrics and result.
+
+    result = train(TrainConfig(plant="lpf"), Path("runs/first"))
+
+The run directory holds run.json (configuration, seed, versions), surrogate.json (lpf), metrics.csv,
+evaluation.json (the searched optimum), stages/ (evaluation saccades at several stages), checkpoint.pt,
+policy.npz and policy.json, result.json, learning.png, policy.png and recording.rrd.
+"""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from rich.progress import Progress
+from stable_baselines3.common.logger import Logger
+
+from orient_eye.environment import SaccadeVecEnv
+from orient_eye.errors import InputError
+from orient_eye.learning.checkpoint import load_checkpoint
+from orient_eye.learning.config import TrainConfig
+from orient_eye.learning.evaluation import TABLE_AMPLITUDES_DEG, Yardstick, amplitude_table
+from orient_eye.learning.loop import CtrlC, Stop, TrainingLoop, progress_bar
+from orient_eye.learning.policy import Policy
+from orient_eye.learning.replay_buffer import OneStepReplayBuffer
+from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
+from orient_eye.plants import Plant, make_plant
+from orient_eye.reward import Weights
+from orient_eye.run_directory import RunDirectory, versions
+from orient_eye.saccade import SaccadeTask
+from orient_eye.surrogate import Surrogate
+
+Array = NDArray[np.float64]
+_NETS = [128, 128, 32]  # thesis 4.6
+
+
+class Interrupted(Exception):
+    """The run was stopped between two updates; its checkpoint is written."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        super().__init__(f"stopped; go on with: orient-eye train --resume {folder}")
+
+
+def train(config: TrainConfig, out: Path | None = None, *, quiet: bool = False) -> dict[str, Any]:
+    """Run a new training.
+
+    Args:
+        config: of the run.
+        out: its directory, new or empty; None for runs/train-DATE-TIME.
+        quiet: no progress bar.
+
+    Returns:
+        The content of result.json.
+
+    Raises:
+        InputError: bad configuration, or the directory is taken.
+        Interrupted: Ctrl-C.
+    """
+    config = config.resolved()
+    plant = _plant(config)  # before the directory: bad input leaves nothing behind
+    _task(config, plant)
+    run = RunDirectory.create(out, "train", config, seed=config.seed)
+    if config.plant == "lpf":
+        Surrogate.load(config.surrogate).save(run.path / "surrogate.json")
+    return _Run(config, run, plant).execute(resume=False, quiet=quiet)
+
+
+def resume(folder: Path, *, quiet: bool = False) -> dict[str, Any]:
+    """Go on with a run that was stopped, to the numbers it would have had.
+
+    Raises:
+        InputError: no run, or nothing to go on from.
+        Interrupted: Ctrl-C.
+    """
+    run = RunDirectory(folder)
+    description = run.read_json("run.json")
+    if description.get("command") != "train":
+        raise InputError(f"{folder} is a run of {description.get('command')!r}, not of train")
+    settings: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in description["config"].items()}
+    config = TrainConfig(**settings)
+    if (folder / "result.json").exists():
+        raise InputError(f"{folder} is finished: its result is in result.json; start a new run without --resume")
+    surrogate = folder / "surrogate.json"
+    return _Run(config, run, _plant(config, surrogate if surrogate.exists() else None)).execute(
+        resume=True, quiet=quiet
+    )
+
+
+def _plant(config: TrainConfig, surrogate: Path | None = None) -> Plant:
+    options = {"surrogate": surrogate or config.surrogate} if config.plant == "lpf" else {"eye": config.eye}
+    return make_plant(config.plant, **options)
+
+
+def _task(config: TrainConfig, plant: Plant) -> SaccadeTask:
+    return SaccadeTask(plant, variant=config.variant, weights=Weights(*config.weights), band=config.band)
+
+
+@dataclass
+class _Run:
+    """One run in progress."""
+
+    config: TrainConfig
+    run: RunDirectory
+    plant: Plant
+    task: SaccadeTask = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.task = _task(self.config, self.plant)
+
+    def execute(self, *, resume: bool, quiet: bool) -> dict[str, Any]:
+        config, folder = self.config, self.run.path
+        # Independent streams from the one seed.
+        streams = np.random.SeedSequence(config.seed).spawn(4)
+        training, buffer, pairs, search = (int(stream.generate_state(1)[0]) for stream in streams)
+        torch.set_num_threads(1)  # these networks are too small to share
+        assert config.saccades_per_update
+        assert config.updates
+        env = SaccadeVecEnv(
+            config.saccades_per_update,
+            self.plant,
+            log_reward=config.reward_scale == "log",
+            seed=training,
+            variant=config.variant,
+            weights=Weights(*config.weights),
+            band=config.band,
+        )
+        model = self._model(env, seed=config.seed, buffer_seed=buffer)
+        with progress_bar(quiet) as bar, CtrlC() as ctrl_c:
+            yardstick, table = self._yardsticks(np.random.default_rng(pairs), np.random.default_rng(search), bar)
+            loop = TrainingLoop(folder, env, config.updates, yardstick, table, bar, ctrl_c)
+            if resume:
+                extra = load_checkpoint(folder, model, env)
+                loop.go_on(extra)
+            total = (self._warmup_steps() + config.updates) * env.num_envs
+            try:
+                left = total - model.num_timesteps
+                model.learn(left, callback=loop, log_interval=10**9, reset_num_timesteps=not resume)
+            except Stop:
+                raise Interrupted(folder) from None
+            loop.finish()
+        return self._conclude(model, yardstick, table, loop)
+
+    def _warmup_steps(self) -> int:
+        assert self.config.saccades_per_update
+        return -(-self.config.warmup // self.config.saccades_per_update)
+
+    def _model(self, env: SaccadeVecEnv, *, seed: int, buffer_seed: int) -> OneStepSAC:
+        config = self.config
+
+        def learning_rate(remaining: float) -> float:
+            return config.learning_rate * max(min(remaining / 0.2, 1.0), 0.03)
+
+        model = OneStepSAC(
+            "MlpPolicy",
+            env,
+            temperature=falling_temperature(*config.temperature),
+            learning_rate=learning_rate,
+            batch_size=config.batch_size,
+            buffer_size=config.replay_size,
+            replay_buffer_class=OneStepReplayBuffer,
+            replay_buffer_kwargs={"seed": buffer_seed},
+            learning_starts=self._warmup_steps() * env.num_envs,
+            train_freq=1,
+            gradient_steps=1,
+            seed=seed,
+            device="cpu",
+            policy_kwargs={
+                "net_arch": _NETS,
+                "features_extractor_class": GazeFeatures,
+                "n_critics": 1,
+                "optimizer_kwargs": {"fused": True},
+            },
+        )
+        model.set_logger(Logger(folder=None, output_formats=[]))
+        return model
+
+    def _yardsticks(
+        self, pairs: np.random.Generator, search: np.random.Generator, bar: Progress
+    ) -> tuple[Yardstick, Yardstick]:
+        """The searched optimum of random pairs and of the table's amplitudes, kept in the run."""
+        name = "evaluation.json"
+        if (self.run.path / name).exists():
+            kept = self.run.read_json(name)
+            return Yardstick.from_plain(self.task, kept["pairs"]), Yardstick.from_plain(self.task, kept["table"])
+        assert self.config.evaluation_pairs
+        start, target = self.task.draw_yaw(self.config.evaluation_pairs, pairs)
+        half = np.array(TABLE_AMPLITUDES_DEG) / 2
+        job = bar.add_task("searching the optimum", total=1.0, note="")
+        both = Yardstick.search(
+            self.task,
+            np.concatenate([start, -half]),
+            np.concatenate([target, half]),
+            search,
+            progress=lambda share: bar.update(job, completed=share),
+        )
+        bar.remove_task(job)
+        content = both.to_plain()
+        count = self.config.evaluation_pairs
+        parts = {
+            "pairs": {k: v[:count] if isinstance(v, list) else v for k, v in content.items()},
+            "table": {k: v[count:] if isinstance(v, list) else v for k, v in content.items()},
+        }
+        self.run.write_json(name, parts)
+        return Yardstick.from_plain(self.task, parts["pairs"]), Yardstick.from_plain(self.task, parts["table"])
+
+    def policy(self, model: OneStepSAC, result: dict[str, Any]) -> Policy:
+        """The mean of the policy, out of torch."""
+        layers = [m for m in [*model.actor.latent_pi, model.actor.mu] if isinstance(m, torch.nn.Linear)]
+        weights = tuple(layer.weight.detach().numpy().T.astype(float) for layer in layers)
+        biases = tuple(layer.bias.detach().numpy().astype(float) for layer in layers)
+        manifest = {
+            "plant": self.plant.identity(),
+            "driven": list(self.task.driven),
+            "variant": self.config.variant,
+            "weights": asdict(self.task.weights),
+            "band": self.task.band,
+            "config": asdict(self.config),
+            "versions": versions(),
+            "result": result,
+        }
+        return Policy(weights, biases, self.task.action_low, self.task.action_high, manifest)
+
+    def _conclude(
+        self, model: OneStepSAC, yardstick: Yardstick, table: Yardstick, loop: TrainingLoop
+    ) -> dict[str, Any]:
+        from orient_eye.learning.figures import draw_learning, draw_policy
+        from orient_eye.learning.stages import record_stages
+
+        policy = self.policy(model, {})
+        action, outcome, gap = yardstick.perform(policy.act)
+        large = np.abs(yardstick.target_yaw_deg - yardstick.start_yaw_deg) > 5
+        off = np.abs(action - yardstick.optimum.action)[large]
+        result = {
+            "out": str(self.run.path),
+            "plant": self.config.plant,
+            "updates": self.config.updates,
+            "saccades": model.num_timesteps,
+            "train_s": round(loop.elapsed, 1),
+            "pairs": len(gap),
+            "gap_mean": float(gap.mean()),
+            "gap_p95": float(np.quantile(gap, 0.95)),
+            "gap_max": float(gap.max()),
+            "reward_mean": float(outcome.reward.total.mean()),
+            "distance_from_optimum_above_5_deg": dict(
+                zip(["B", "D", "k0"], off.mean(axis=(0, 1)).tolist(), strict=True)
+            ),
+            "failed_saccades": loop.failed,
+            "table": amplitude_table(table, policy.act),
+        }
+        Policy(policy.weights, policy.biases, policy.low, policy.high, {**policy.manifest, "result": result}).save(
+            self.run.path
+        )
+        draw_learning(self.run.path / "metrics.csv", self.run.path / "learning.png")
+        draw_policy(self.task, policy, yardstick, self.run.path / "policy.png")
+        record_stages(self.task, self.run.path, table)
+        self.run.write_json("result.json", result)
+        return result

@@ -1,0 +1,187 @@
+"""The time series of a recording: which curves a saccade has, and the plots they stand in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orient_eye import rotations
+from orient_eye.recording.scene import REFERENCE_COLOUR, TIMELINE, Colour, slug
+from orient_eye.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+Array = NDArray[np.float64]
+TARGET_COLOUR = (165, 165, 170)
+TENDON_COLOURS: tuple[Colour, ...] = (
+    (80, 160, 220), (255, 150, 60), (90, 190, 90), (235, 90, 90), (175, 130, 210),
+    (170, 125, 110), (235, 140, 200), (200, 200, 70), (60, 200, 210), (150, 150, 150),
+)  # fmt: skip
+_TURNS = {"yaw": "z", "pitch": "y", "roll": "x"}  # an angle and the axis of its velocity
+STILL_DEG = 0.5
+"""Pitch and roll that stay below are left out."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot that every saccade has.
+
+    Attributes:
+        name: with its unit.
+        series: entity paths below a saccade's root; those of the reference are added.
+        span: smallest and largest value over all saccades, so that tabs compare.
+        legend: needed to tell the curves of one saccade apart.
+        shaded: the first curve is drawn in a shade of its saccade's colour, because of its place in a saccade's tab.
+    """
+
+    name: str
+    series: tuple[str, ...]
+    span: tuple[float, float]
+    legend: bool = False
+    shaded: bool = False
+
+
+class Curves:
+    """The curves of a batch of saccades, in deg, deg/s and N.
+
+    Args:
+        trajectory: the saccades.
+        drawn: those that will be drawn.
+        tension: of the tendons [N], (saccades, time, tendons).
+        tendons: their names.
+        target: orientations (saccades, 4), or None.
+        reference: another trajectory of the same saccades, or None.
+
+    Attributes:
+        own: entity path below a saccade's root to values (saccades, time).
+        target: the same of the target, (saccades,).
+        reference: the same of the reference, (saccades, its time); its root is the saccade's "reference".
+        largest_deg: largest yaw, pitch and roll either way; 0 for those left out.
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        drawn: list[int],
+        tension: Array,
+        tendons: tuple[str, ...],
+        *,
+        target: Array | None = None,
+        reference: Trajectory | None = None,
+    ) -> None:
+        self._drawn, self._time, self._tension, self._tendons = drawn, trajectory.time, tension, tendons
+        orientations = [trajectory.orientation[drawn]]
+        orientations += [] if target is None else [target[drawn]]
+        orientations += [] if reference is None else [np.nan_to_num(reference.orientation[drawn])]
+        angles = [_angles(q) for q in orientations]
+        largest = {turn: max(float(abs(each[turn]).max(initial=0)) for each in angles) for turn in _TURNS}
+        turns = [turn for turn in _TURNS if turn == "yaw" or largest[turn] > STILL_DEG]
+        self.largest_deg = {turn: largest[turn] if turn in turns else 0.0 for turn in _TURNS}
+        self.own = _curves(trajectory, turns)
+        self.target = {} if target is None else {f"angle/target_{turn}": _angles(target)[turn] for turn in turns}
+        self.reference = {} if reference is None else _curves(reference, turns)
+        self._reference_time = np.zeros(0) if reference is None else reference.time
+        self._reference_failed = np.zeros(0, bool) if reference is None else reference.failed
+
+    def plots(self) -> list[Plot]:
+        """Those beside the eye: angles with their targets, motors, velocity, tension."""
+        moving = self._moving_motors()
+        plots = [
+            self._plot(self._angle_name(*self._named("angle")), [*self._named("angle"), *self.target]),
+            self._plot(", ".join(name.removeprefix("motor/") for name in moving) + " [deg]", moving),
+            self._plot("angular velocity [deg/s]", self._named("velocity")),
+        ]
+        if self._tendons:
+            top = float(self._tension[self._drawn].max(initial=0))
+            plots.append(Plot("tension [N]", ("tension",), (0, top), legend=True))
+        return plots
+
+    def compared(self) -> list[Plot]:
+        """Those that show all saccades: one curve a saccade in each, with its target."""
+        plots = []
+        for plot in self.plots():
+            for place, curve in enumerate(name for name in plot.series if name in self.own):
+                quantity, what = curve.split("/")
+                if quantity == "angle":
+                    goal = f"angle/target_{what}"
+                    series = [curve, *([goal] if goal in self.target else [])]
+                    each = self._plot(self._angle_name(curve), series)
+                else:
+                    name = f"{what} [deg]" if quantity == "motor" else f"angular velocity about {what} [deg/s]"
+                    each = self._plot(name, [curve])
+                plots.append(replace(each, shaded=place > 0))
+        return plots
+
+    def draw(self, rec: "rr.RecordingStream", root: str, saccade: int, *, title: str, colour: Colour) -> None:
+        """Send a saccade's curves: in its colour, or shades of it where a plot has several."""
+        place = {name: i for plot in self.plots() for i, name in enumerate(plot.series)}
+        for path, values in self.own.items():
+            style = _style(f"{path.split('/')[1]} {title}", shade(colour, place.get(path, 0)), 2)
+            _send(rec, f"{root}/{path}", self._time, values[saccade], style)
+        for path, angle in self.target.items():
+            style = _style(f"{path.split('/')[1].replace('_', ' ')} {title}", TARGET_COLOUR, 1)
+            _send(rec, f"{root}/{path}", self._time, np.full_like(self._time, angle[saccade]), style)
+        if self.reference and not self._reference_failed[saccade]:
+            for path, values in self.reference.items():
+                style = _style(f"reference {path.split('/')[1]} {title}", REFERENCE_COLOUR, 1)
+                _send(rec, f"{root}/reference/{path}", self._reference_time, values[saccade], style)
+        if self._tendons:
+            colours = [TENDON_COLOURS[i % len(TENDON_COLOURS)] for i in range(len(self._tendons))]
+            style = {"names": self._tendons, "colors": colours, "widths": [1.5] * len(colours)}
+            _send(rec, f"{root}/tension", self._time, self._tension[saccade], style)
+
+    def _named(self, quantity: str) -> list[str]:
+        return [name for name in self.own if name.startswith(f"{quantity}/")]
+
+    def _moving_motors(self) -> list[str]:
+        motors = self._named("motor")
+        moving = [name for name in motors if self._drawn and np.ptp(np.nan_to_num(self.own[name][self._drawn])) > 0]
+        return moving or motors
+
+    def _angle_name(self, *curves: str) -> str:
+        angles = ", ".join(curve.removeprefix("angle/") for curve in curves)
+        return f"{angles} [deg]" + (", target grey" if self.target else "")
+
+    def _plot(self, name: str, series: Sequence[str]) -> Plot:
+        sources = (self.own, self.target, self.reference)
+        values = [np.nan_to_num(curves[each][self._drawn]) for curves in sources for each in series if each in curves]
+        span = float(min(v.min(initial=0) for v in values)), float(max(v.max(initial=0) for v in values))
+        return Plot(name, tuple(series), span, legend=sum(each in self.own for each in series) > 1)
+
+
+def shade(colour: Colour, place: int) -> Colour:
+    """The colour of the first, second, third ... curve of a saccade in one plot."""
+    toward, share = ((0, 0.0), (255, 0.6), (0, 0.45), (255, 0.8), (0, 0.65))[place % 5]
+    r, g, b = (round((1 - share) * c + share * toward) for c in colour)
+    return r, g, b
+
+
+def _angles(orientation: Array) -> dict[str, Array]:
+    return dict(zip(("yaw", "pitch", "roll"), rotations.to_euler(orientation), strict=True))
+
+
+def _curves(trajectory: Trajectory, turns: Sequence[str]) -> dict[str, Array]:
+    angles = _angles(trajectory.orientation)
+    curves = {f"angle/{turn}": angles[turn] for turn in turns}
+    curves |= {f"velocity/{_TURNS[t]}": trajectory.angular_velocity[..., "xyz".index(_TURNS[t])] for t in turns}
+    return curves | {f"motor/{slug(name)}": trajectory.motor[..., i] for i, name in enumerate(trajectory.motor_names)}
+
+
+def _style(name: str, colour: Colour, width: float) -> dict[str, Any]:
+    return {"names": [name], "colors": [colour], "widths": [width]}
+
+
+def _send(rec: "rr.RecordingStream", path: str, time: Array, values: Array, style: dict[str, Any]) -> None:
+    """A time series: values (time,) or (time, curves) at times [s]; a constant sends its ends."""
+    import rerun as rr
+
+    if time.size > 2 and (values == values[0]).all():
+        time, values = time[[0, -1]], values[[0, -1]]
+    rec.log(path, rr.SeriesLines(**style), static=True)
+    columns = rr.Scalars.columns(scalars=values.ravel())
+    if values.ndim > 1:
+        columns = columns.partition([values.shape[1]] * len(values))
+    rec.send_columns(path, [rr.TimeColumn(TIMELINE, duration=time)], columns)

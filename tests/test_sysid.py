@@ -1,0 +1,253 @@
+"""Identification: models against scipy's simulator, fits against known truth, plants against the author's numbers."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from orient_eye.cli.sysid import Sysid
+from orient_eye.errors import InputError
+from orient_eye.plants import PLANTS, make_plant
+from orient_eye.surrogate import Surrogate
+from orient_eye.sysid import StepResponse, identify_plant, identify_recordings
+from orient_eye.sysid.comparison import compare, preferred
+from orient_eye.sysid.fit import fit_model
+from orient_eye.sysid.models import MODELS
+from orient_eye.sysid.plant_steps import plant_steps
+
+# Step responses of the thesis author's own program (1 ms Euler), each fitted with K A (1 - exp(-w0 t)) by
+# least squares over 0.8 s; the numbers behind thesis Figure 3.5.
+AUTHOR_DEG = (2, 5, 8, 10, 12, 15, 18, 20, 25, 30)
+AUTHOR_K = (1.4639, 1.4646, 1.4660, 1.4672, 1.4688, 1.4717, 1.4753, 1.4782, 1.4872, 1.4988)
+AUTHOR_W0 = (17.803, 17.752, 17.656, 17.567, 17.458, 17.257, 17.008, 16.817, 16.243, 15.535)
+
+TRUTH = {
+    "first_order": (1.4, 17.5),
+    "first_order_dead_time": (0.75, 30.0, 0.018),
+    "second_order": (-1.2, 40.0, 0.4),
+    "second_order_dead_time": (0.75, 80.0, 0.35, 0.009),
+}
+
+
+def ramp(rng: np.random.Generator, rows: int = 150, end: float = 20.0, duration: float = 0.6) -> StepResponse:
+    """A motor that takes 80 ms for its step, logged at uneven times, and an eye that does not move yet."""
+    time = np.cumsum(rng.uniform(0.5, 1.5, rows))
+    time = duration * (time - time[0]) / (time[-1] - time[0])
+    motor = end * np.clip((time - 0.02) / 0.08, 0, 1)
+    return StepResponse("synthetic", time, motor, np.zeros(rows))
+
+
+def noisy(step: StepResponse, model: str, noise: float, rng: np.random.Generator) -> StepResponse:
+    answer = MODELS[model].response(np.array(TRUTH[model]), step)
+    return replace(step, eye_deg=answer + noise * rng.normal(size=answer.size))
+
+
+# --- models ---------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    w=st.floats(2, 100),
+    zeta=st.one_of(st.floats(0.1, 4), st.just(1.0), st.just(1 + 1e-9)),
+    dead_time=st.floats(0, 0.1),
+)
+def test_responses_equal_scipys_simulator(seed: int, w: float, zeta: float, dead_time: float) -> None:
+    step = ramp(np.random.default_rng(seed), rows=40)
+    grid = np.unique(np.concatenate([np.linspace(0, 0.6, 4001), step.time, step.time + dead_time]))
+    grid = grid[grid <= 0.6]
+    drive = np.interp(grid - dead_time, step.time, step.motor_deg, left=0.0)
+    fine = np.linspace(0, 0.6, 6001)
+    for name, values, system in (
+        ("first_order_dead_time", (1.5, w, dead_time), ([1.5 * w], [1, w])),
+        ("second_order_dead_time", (1.5, w, zeta, dead_time), ([1.5 * w * w], [1, 2 * zeta * w, w * w])),
+    ):
+        _, answer, _ = signal.lsim(system, np.interp(fine, grid, drive), fine)
+        expected = np.interp(step.time, fine, answer)
+        np.testing.assert_allclose(MODELS[name].response(np.array(values), step), expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_response_to_an_ideal_step_is_the_textbook_formula(name: str) -> None:
+    time = np.linspace(0, 0.8, 801)
+    step = StepResponse("", time, np.full(801, 10.0), np.zeros(801))
+    K, w, zeta, late = 1.5, 17.5, 0.5, 0.05
+    elapsed = np.maximum(time - (late if name.endswith("dead_time") else 0), 0)
+    if name.startswith("first"):
+        values, expected = [K, w], 10 * K * (1 - np.exp(-w * elapsed))
+    else:
+        damped = w * np.sqrt(1 - zeta**2)
+        swing = np.cos(damped * elapsed) + zeta * w / damped * np.sin(damped * elapsed)
+        values, expected = [K, w, zeta], 10 * K * (1 - np.exp(-zeta * w * elapsed) * swing)
+    values += [late] if name.endswith("dead_time") else []
+    np.testing.assert_allclose(MODELS[name].response(np.array(values), step), expected, atol=1e-12)
+
+
+# --- fits -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_known_parameters_are_recovered(name: str) -> None:
+    rng = np.random.default_rng(7)
+    fit = fit_model(MODELS[name], [noisy(ramp(rng, end=end), name, 0.1, rng) for end in (10.0, 20.0)])
+    for estimate, true in zip(fit.estimates, TRUTH[name], strict=True):
+        assert abs(estimate.value - true) < 1.5 * estimate.half_width
+        assert estimate.half_width < 0.1 * abs(true)
+    assert fit.rms_deg == pytest.approx(0.1, rel=0.15)
+    assert not fit.warnings
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_exact_data_give_exact_parameters(name: str) -> None:
+    rng = np.random.default_rng(0)
+    fit = fit_model(MODELS[name], [noisy(ramp(rng), name, 0, rng)])
+    np.testing.assert_allclose(fit.values, TRUTH[name], rtol=1e-6)
+
+
+def test_confidence_intervals_cover_the_truth_as_often_as_they_say() -> None:
+    rng = np.random.default_rng(1)
+    inside = []
+    for _ in range(200):
+        fit = fit_model(MODELS["first_order"], [noisy(ramp(rng, rows=50), "first_order", 0.3, rng)])
+        bounds = [e.interval for e in fit.estimates]
+        inside += [low < true < high for (low, high), true in zip(bounds, TRUTH["first_order"], strict=True)]
+    assert 0.92 < np.mean(inside) < 0.99
+
+
+def test_autocorrelated_residuals_widen_the_interval() -> None:
+    rng = np.random.default_rng(2)
+    step = ramp(rng, rows=200)
+    white = rng.normal(size=200)
+    coloured = signal.lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], white)
+    answer = MODELS["first_order"].response(np.array(TRUTH["first_order"]), step)
+    widths = [
+        fit_model(MODELS["first_order"], [replace(step, eye_deg=answer + 0.2 * n)])["w0"].half_width
+        for n in (white, coloured)
+    ]
+    assert widths[1] > 2 * widths[0]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_comparison_prefers_the_true_model(name: str) -> None:
+    rng = np.random.default_rng(5)
+    rows = compare([noisy(ramp(rng, end=end), name, 0.1, rng) for end in (8.0, 16.0, 24.0)])
+    least = min(row.aicc for row in rows)
+    assert {row.fit.model.name: row.aicc - least < 4 for row in rows}[name]  # a superfluous parameter can win by luck
+    assert all(row.aicc - least > 4 for row in rows if row.held_out_rms_deg > 0.13)
+    chosen = preferred(rows)
+    assert chosen.fit.model.name == name
+    assert chosen.held_out_rms_deg == pytest.approx(0.1, rel=0.15)
+
+
+def test_what_the_data_cannot_tell_is_said() -> None:
+    rng = np.random.default_rng(4)
+    first = noisy(ramp(rng), "first_order", 0.1, rng)
+    early = replace(first, eye_deg=MODELS["first_order"].response(np.array([1.4, 17.5]), first))
+    assert "show none" in " ".join(fit_model(MODELS["first_order_dead_time"], [early]).warnings)
+    rigid = replace(first, eye_deg=1.4 * first.motor_deg)
+    assert "sits on its bound" in " ".join(fit_model(MODELS["first_order"], [rigid]).warnings)
+    noise = replace(first, eye_deg=rng.normal(size=first.time.size))
+    assert "cannot be told" in " ".join(fit_model(MODELS["first_order"], [noise]).warnings)
+
+
+def test_no_movement_is_refused() -> None:
+    step = ramp(np.random.default_rng(0))
+    with pytest.raises(InputError, match="eye does not move"):
+        fit_model(MODELS["first_order"], [step])
+    with pytest.raises(InputError, match="motor does not move"):
+        fit_model(MODELS["first_order"], [replace(step, motor_deg=0 * step.motor_deg, eye_deg=step.motor_deg)])
+
+
+# --- plants ---------------------------------------------------------------------------------------------
+
+
+def test_mujoco_fits_equal_the_authors() -> None:
+    found = identify_plant(make_plant("mujoco"), AUTHOR_DEG)
+    np.testing.assert_allclose([fits[0]["K"].value for fits in found.fits], AUTHOR_K, rtol=2e-4)
+    np.testing.assert_allclose([fits[0]["w0"].value for fits in found.fits], AUTHOR_W0, rtol=2e-4)
+
+
+def test_mujoco_surrogate_is_the_thesis_one() -> None:
+    found = identify_plant(make_plant("mujoco"), range(1, 26), held_out=(4.5, 19.5))
+    gain = found.surrogate.K
+    assert gain == pytest.approx(1.476, abs=0.005)  # thesis 3.3.1 prints 1.4758
+    assert found.surrogate.w0 == pytest.approx(17.5, abs=0.15)  # and 17.5
+    assert all(h.r_squared > 0.997 for h in found.held_out_fit)
+    assert not found.warnings
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_every_plant_can_be_identified(name: str) -> None:
+    found = identify_plant(make_plant(name), (5.0, -10.0), held_out=(7.5,))
+    gain = found.surrogate.K
+    assert gain == pytest.approx(1.4667 if name != "lpf" else 1.4758, rel=1e-3)
+    assert found.surrogate.w0 == pytest.approx(17.567 if name != "lpf" else 17.5, rel=1e-3)
+
+
+def test_lpf_returns_its_own_numbers() -> None:
+    plant = make_plant("lpf", surrogate=Surrogate(K=0.9, w0=33.0))
+    found = identify_plant(plant, (3.0, 9.0, 300.0), held_out=(6.0,))
+    gain = found.surrogate.K
+    assert gain == pytest.approx(0.9, rel=1e-9)
+    assert found.surrogate.w0 == pytest.approx(33.0, rel=1e-9)
+    assert found.preferred.fit.model.name == "first_order"
+    assert all(h.rms_deg < 1e-6 for h in found.held_out_fit)
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "motor", "words"),
+    [
+        ((), "motor2", "no step amplitude"),
+        ((5.0, 0.0), "motor2", "step of 0 deg"),
+        ((5.0, float("nan")), "motor2", "nan"),
+        ((5.0, 5.0), "motor2", "twice"),
+        ((81.0,), "motor2", "outside the mechanical range of motor2, -80 to 80"),
+        ((5.0,), "motor7", "no motor 'motor7'"),
+    ],
+)
+def test_steps_a_plant_cannot_do_are_refused(amplitudes: tuple[float, ...], motor: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        identify_plant(make_plant("mujoco"), amplitudes, motor=motor)
+
+
+def test_steps_past_the_bend_are_warned_of() -> None:
+    assert "bends over" in plant_steps(make_plant("mujoco"), (60.0,)).warnings[0]
+
+
+# --- command --------------------------------------------------------------------------------------------
+
+
+def test_command_writes_what_train_and_people_need(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    result = Sysid(plant="mujoco", amplitudes=(5.0, 10.0), held_out=(7.5,), out=out).run()
+    assert sorted(f.name for f in out.iterdir()) == sorted([*result["files"], "run.json"])
+    number = Surrogate.load(out / "surrogate.json")
+    assert (number.K, number.w0) == (result["K"], result["w0"])
+    assert number.details["steps"][1]["w0_interval"][0] < number.w0 < number.details["steps"][1]["w0_interval"][1]
+    json.loads(json.dumps(result, allow_nan=False))
+    rows = list(csv.DictReader((out / "fits.csv").open()))
+    assert len(rows) == len(json.loads((out / "fits.json").read_text())) == 2 + len(MODELS)
+    assert float(rows[1]["K_low"]) < float(rows[1]["K"]) < float(rows[1]["K_high"])
+    for picture in ("figure_3_5.png", "figure_3_6.png"):
+        assert (out / picture).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_setting_the_plant_has_not_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="--accurate"):
+        Sysid(plant="lpf", accurate=True, out=tmp_path / "run").run()
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_trained_surrogate_is_that_of_the_recordings() -> None:
+    rng = np.random.default_rng(3)
+    steps = [noisy(ramp(rng, end=end), "second_order_dead_time", 0.05, rng) for end in (10.0, 20.0)]
+    found = identify_recordings(steps)
+    joint = fit_model(MODELS["first_order"], steps)
+    assert (found.surrogate.K, found.surrogate.w0) == (joint["K"].value, joint["w0"].value)
+    assert any("describes these data better" in w for w in found.warnings)
