@@ -54,7 +54,13 @@ def to_scaled(task: SaccadeTask, action: Array) -> Array:
     return (2 * (action - low) / (high - low) - 1).reshape(len(action), -1)
 
 
-def _task(plant: Plant | str, plant_options: dict[str, Any] | None, task_options: dict[str, Any]) -> SaccadeTask:
+def _task(
+    plant: Plant | SaccadeTask | str, plant_options: dict[str, Any] | None, task_options: dict[str, Any]
+) -> SaccadeTask:
+    if isinstance(plant, SaccadeTask):
+        if plant_options or task_options:
+            raise InputError("plant and task options go with a plant; this task is made already")
+        return plant
     if isinstance(plant, str):
         plant = make_plant(plant, **(plant_options or {}))
     elif plant_options:
@@ -92,7 +98,7 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     v0: the first.
 
     Args:
-        plant: a name of `orient_eye.plants.PLANTS`, or a plant.
+        plant: a name of `orient_eye.plants.PLANTS`, a plant, or a whole task.
         plant_options: keywords of that plant.
         log_reward: give the log reward.
         task_options: keywords of `SaccadeTask`: driven, variant, C, weights, band, horizon_s.
@@ -102,7 +108,7 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __init__(
         self,
-        plant: Plant | str = "lpf",
+        plant: Plant | SaccadeTask | str = "lpf",
         *,
         plant_options: dict[str, Any] | None = None,
         log_reward: bool = False,
@@ -181,7 +187,7 @@ class SaccadeVecEnv(VecEnv):
 
     Args:
         saccades: environments in the batch.
-        plant: a name of `orient_eye.plants.PLANTS`, or a plant.
+        plant: a name of `orient_eye.plants.PLANTS`, a plant, or a whole task.
         plant_options: keywords of that plant.
         log_reward: give the log reward.
         seed: of starts and targets.
@@ -191,7 +197,7 @@ class SaccadeVecEnv(VecEnv):
     def __init__(
         self,
         saccades: int,
-        plant: Plant | str = "lpf",
+        plant: Plant | SaccadeTask | str = "lpf",
         *,
         plant_options: dict[str, Any] | None = None,
         log_reward: bool = False,

@@ -16,7 +16,8 @@ from orient_eye.saccade import Fixation, SaccadeTask
 
 Array = NDArray[np.float64]
 _ISLANDS = 3
-_MERGE = 0.5  # share of the generations after which the islands become one
+_RESTARTS = {0.3: 1.0, 0.55: 0.3, 0.8: 0.1}  # share of the generations: spread around the best
+_NEAR = (0.05, 0.002, 0.03)  # in B, D and k0, shares of their ranges
 
 
 @dataclass(frozen=True)
@@ -67,21 +68,28 @@ def find_optimum(
         return task.perform(many_starts, actions, many_targets).reward.total.reshape(saccades, population)
 
     x = _spread(random, (saccades, population, low.size))
-    # Half of the candidates end near the target: the rest of the search is then about B and k0.
+    # Most candidates end near the target: the rest of the search is then about B and k0.
     lands = (task.lands_on(target) - task.action_low[:, 1]) / (task.action_high - task.action_low)[:, 1]
-    near = random.normal(lands[:, None], 0.003, (saccades, population // 2, driven))
-    x[:, : population // 2, 1::3] = np.clip(near, 0, 1)
-    # Islands begin in one stratum of k0 each and breed among themselves, so that the basins on both
-    # sides of the cliff stay alive until each is known for what it is worth.
+    near = random.normal(lands[:, None], 0.003, (saccades, population, driven))
+    anywhere = (np.arange(population) // _ISLANDS % 6 == 5)[:, None]
+    x[..., 1::3] = np.where(anywhere, x[..., 1::3], np.clip(near, 0, 1))
+    # Islands begin in one stratum of k0 each and breed only among themselves: the basins on both sides
+    # of the cliff stay alive. Each begins anew around its best candidate, closer every time, so that one
+    # that settled too early moves on.
     island = np.arange(population) % _ISLANDS
     x[..., 2::3] = (x[..., 2::3] + island[:, None]) / _ISLANDS
     value = judge(x)
     mates = np.array([np.flatnonzero(island == i) for i in island])
     each, columns = np.arange(saccades)[:, None], np.arange(population)
+    restarts = {round(share * generations): spread for share, spread in _RESTARTS.items()}
     for generation in range(generations):
-        if generation == round(_MERGE * generations):
-            mates = np.tile(columns, (population, 1))
         best = np.take_along_axis(mates[None], value[:, mates].argmax(axis=2)[..., None], axis=2)[..., 0]
+        if generation in restarts:
+            near = np.tile(_NEAR, driven) * restarts[generation]
+            moved = np.clip(x[each, best] + random.normal(size=x.shape) * near, 0, 1)
+            x = np.where((best == columns)[..., None], x, moved)
+            value = judge(x)
+            continue
         chosen = random.integers(mates.shape[1], size=(2, saccades, population))
         one, two = mates[columns, chosen[0]], mates[columns, chosen[1]]
         # "current to best / 1 / bin", with a scale drawn anew for each candidate.

@@ -7,7 +7,8 @@
 The low-pass plant is measured in closed form, every other plant from its sampled trajectory.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,6 +100,43 @@ class SaccadeTask:
         if not 0 < self.band < 1:
             raise InputError(f"the settling band is a share of the amplitude between 0 and 1, got {self.band}")
 
+    @classmethod
+    def of_case(cls, plant: Plant, case: str, **options: Any) -> "SaccadeTask":
+        """One of the thesis' five cases (`orient_eye.cases.CASES`) on a plant.
+
+        Args:
+            plant: any plant.
+            case: its name.
+            options: attributes that differ from the case's.
+
+        Raises:
+            InputError: unknown case.
+        """
+        from orient_eye.cases import get_case
+
+        chosen = get_case(case)
+        return cls(plant, **{"variant": chosen.variant, "C": chosen.C, "weights": chosen.weights, **options})
+
+    def identity(self) -> dict[str, Any]:
+        """Everything that decides what an action is worth, in plain values: for manifests and caches."""
+        return {
+            "plant": self.plant.identity(),
+            "driven": list(self.driven),
+            "variant": self.variant,
+            "C": self.onset,
+            "speed_limit": self.speed_limit if self.onset == "varying" else None,
+            "weights": asdict(self.weights),
+            "band": self.band,
+            "horizon_s": None if isinstance(self.plant, LowPassPlant) else self.horizon_s,
+            "low": self.action_low.tolist(),
+            "high": self.action_high.tolist(),
+        }
+
+    @property
+    def onset(self) -> float | str | None:
+        """C as it is used: a number, "varying", or None in variant 1."""
+        return FIXED_C[self.variant] if self.C is None and self.variant in FIXED_C else self.C
+
     @property
     def action_low(self) -> Array:
         """Lower bounds of B, D, k0, (driven, 3)."""
@@ -141,8 +179,9 @@ class SaccadeTask:
         F = start.motor[:, self.driven_index]
         C: ArrayLike | None = None
         if self.variant in FIXED_C:
-            fixed = FIXED_C[self.variant] if self.C is None else self.C
-            C = varying_C(self.variant, D - F, B, k0, self.speed_limit) if fixed == "varying" else fixed
+            C = self.onset
+            if C == "varying":
+                C = varying_C(self.variant, D - F, B, k0, self.speed_limit)
         return PulseStep(F, B, D, k0, self.variant, C)
 
     def perform(self, start: Fixation, action: Array, target: Array) -> Outcome:

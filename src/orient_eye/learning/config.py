@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from orient_eye.cases import get_case
 from orient_eye.errors import InputError
 
 
@@ -23,10 +24,12 @@ class TrainConfig:
     """For lpf: a surrogate.json written by sysid, or the name of a shipped one."""
     eye: str = "thesis"
     """For mujoco and tavares: preset of the eye."""
-    variant: Literal[1, 2, 3] = 1
-    """Pulse of the motor command (thesis 4.3)."""
-    weights: tuple[float, float, float, float] = (2.66e7, 1.0, 5.12e5, 2.3e8)
-    """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32)."""
+    case: Literal["1", "2-fixed", "2-varying", "3-fixed", "3-varying"] = "1"
+    """Pulse of the motor command and its onset rate C: one of the thesis' five cases (4.3, 5.1 to 5.3)."""
+    speed_limit: float = 7200.0
+    """Motor speed to which a varying C brings the command, deg/s."""
+    weights: Annotated[tuple[float, float, float, float] | None, _default("those of the case")] = None
+    """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32; orient-eye weights)."""
     band: float = 0.01
     """Settling band, share of the amplitude."""
     updates: int = 14_000
@@ -57,7 +60,9 @@ class TrainConfig:
             InputError: a number out of its range.
         """
         closed_form = self.plant == "lpf"
+        weights = get_case(self.case).weights
         defaults = {
+            "weights": (weights.accuracy, weights.energy, weights.duration, weights.overshoot),
             "saccades_per_update": 128 if closed_form else 32,
             "evaluation_pairs": 300 if closed_form else 100,
         }

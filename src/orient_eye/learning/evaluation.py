@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orient_eye.optimum import Optimum, find_optimum
+from orient_eye.optimum import Optimum
+from orient_eye.optimum_cache import searched_optimum
 from orient_eye.saccade import Fixation, Outcome, SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
@@ -18,6 +19,7 @@ Act = Callable[[Array, Array], Array]
 """From starts and targets (saccades, 4) to actions (saccades, driven, 3)."""
 TABLE_AMPLITUDES_DEG = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0)
 """Amplitudes of the table at the end of a run; symmetric saccades."""
+_SEED = 2021
 
 
 @dataclass(frozen=True)
@@ -46,13 +48,18 @@ class Yardstick:
         task: SaccadeTask,
         start_yaw_deg: Array,
         target_yaw_deg: Array,
-        random: np.random.Generator,
         progress: Callable[[float], None] | None = None,
     ) -> "Yardstick":
-        """Search the optimum of saccades between these gaze directions [deg], each (saccades,)."""
-        start, target = task.fixate(horizontal(start_yaw_deg)), horizontal(target_yaw_deg)
-        optimum = find_optimum(task, start, target, random, progress=progress)
-        return cls(task, start_yaw_deg, target_yaw_deg, start, target, optimum)
+        """Search the optimum of saccades between these gaze directions [deg], each (saccades,), or remember it."""
+        optimum = searched_optimum(task, start_yaw_deg, target_yaw_deg, progress=progress)
+        start = task.fixate(horizontal(start_yaw_deg))
+        return cls(task, start_yaw_deg, target_yaw_deg, start, horizontal(target_yaw_deg), optimum)
+
+    def __getitem__(self, which: slice) -> "Yardstick":
+        index = np.arange(len(self.target))[which]
+        optimum = Optimum(self.optimum.action[which], self.optimum.reward[which], self.optimum.evaluations)
+        yaw = self.start_yaw_deg[which], self.target_yaw_deg[which]
+        return Yardstick(self.task, *yaw, self.start[index], self.target[which], optimum)
 
     def perform(self, act: Act) -> tuple[Array, Outcome, Array]:
         """The policy's actions (saccades, driven, 3), what came of them, and the gaps (saccades,)."""
@@ -71,13 +78,18 @@ class Yardstick:
             "evaluations": self.optimum.evaluations,
         }
 
-    @classmethod
-    def from_plain(cls, task: SaccadeTask, plain: dict[str, Any]) -> "Yardstick":
-        """The inverse of `to_plain`."""
-        start_yaw, target_yaw = np.array(plain["start_yaw_deg"]), np.array(plain["target_yaw_deg"])
-        optimum = Optimum(np.array(plain["action"]), np.array(plain["reward"]), plain["evaluations"])
-        start = task.fixate(horizontal(start_yaw))
-        return cls(task, start_yaw, target_yaw, start, horizontal(target_yaw), optimum)
+
+def evaluation_saccades(
+    task: SaccadeTask, count: int, progress: Callable[[float], None] | None = None
+) -> tuple[Yardstick, Yardstick]:
+    """Random saccades over the whole range, and symmetric ones of the table's amplitudes.
+
+    They depend on nothing but their number, so that runs can be compared and their optimum is searched once.
+    """
+    start, target = task.draw_yaw(count, np.random.default_rng(_SEED))
+    half = np.array(TABLE_AMPLITUDES_DEG) / 2
+    both = Yardstick.search(task, np.concatenate([start, -half]), np.concatenate([target, half]), progress)
+    return both[:count], both[count:]
 
 
 def amplitude_table(yardstick: Yardstick, act: Act) -> list[dict[str, float]]:

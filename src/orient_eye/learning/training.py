@@ -21,7 +21,7 @@ from orient_eye.environment import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.checkpoint import load_checkpoint
 from orient_eye.learning.config import TrainConfig
-from orient_eye.learning.evaluation import TABLE_AMPLITUDES_DEG, Yardstick, amplitude_table
+from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluation_saccades
 from orient_eye.learning.loop import CtrlC, Stop, TrainingLoop, progress_bar
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
@@ -95,7 +95,9 @@ def _plant(config: TrainConfig, surrogate: Path | None = None) -> Plant:
 
 
 def _task(config: TrainConfig, plant: Plant) -> SaccadeTask:
-    return SaccadeTask(plant, variant=config.variant, weights=Weights(*config.weights), band=config.band)
+    assert config.weights
+    weights = Weights(*config.weights)
+    return SaccadeTask.of_case(plant, config.case, weights=weights, band=config.band, speed_limit=config.speed_limit)
 
 
 @dataclass
@@ -113,23 +115,20 @@ class _Run:
     def execute(self, *, resume: bool, quiet: bool) -> dict[str, Any]:
         config, folder = self.config, self.run.path
         # Independent streams from the one seed.
-        streams = np.random.SeedSequence(config.seed).spawn(4)
-        training, buffer, pairs, search = (int(stream.generate_state(1)[0]) for stream in streams)
+        streams = np.random.SeedSequence(config.seed).spawn(2)
+        training, buffer = (int(stream.generate_state(1)[0]) for stream in streams)
         torch.set_num_threads(1)  # these networks are too small to share
         assert config.saccades_per_update
         assert config.updates
         env = SaccadeVecEnv(
             config.saccades_per_update,
-            self.plant,
+            self.task,
             log_reward=config.reward_scale == "log",
             seed=training,
-            variant=config.variant,
-            weights=Weights(*config.weights),
-            band=config.band,
         )
         model = self._model(env, seed=config.seed, buffer_seed=buffer)
         with progress_bar(quiet) as bar, CtrlC() as ctrl_c:
-            yardstick, table = self._yardsticks(np.random.default_rng(pairs), np.random.default_rng(search), bar)
+            yardstick, table = self._yardsticks(bar)
             loop = TrainingLoop(folder, env, config.updates, yardstick, table, bar, ctrl_c)
             if resume:
                 extra = load_checkpoint(folder, model, env)
@@ -177,34 +176,16 @@ class _Run:
         model.set_logger(Logger(folder=None, output_formats=[]))
         return model
 
-    def _yardsticks(
-        self, pairs: np.random.Generator, search: np.random.Generator, bar: Progress
-    ) -> tuple[Yardstick, Yardstick]:
-        """The searched optimum of random pairs and of the table's amplitudes, kept in the run."""
-        name = "evaluation.json"
-        if (self.run.path / name).exists():
-            kept = self.run.read_json(name)
-            return Yardstick.from_plain(self.task, kept["pairs"]), Yardstick.from_plain(self.task, kept["table"])
+    def _yardsticks(self, bar: Progress) -> tuple[Yardstick, Yardstick]:
+        """Random saccades, the same for every run, and the table's amplitudes, with their searched optimum."""
         assert self.config.evaluation_pairs
-        start, target = self.task.draw_yaw(self.config.evaluation_pairs, pairs)
-        half = np.array(TABLE_AMPLITUDES_DEG) / 2
         job = bar.add_task("searching the optimum", total=1.0, note="")
-        both = Yardstick.search(
-            self.task,
-            np.concatenate([start, -half]),
-            np.concatenate([target, half]),
-            search,
-            progress=lambda share: bar.update(job, completed=share),
+        pairs, table = evaluation_saccades(
+            self.task, self.config.evaluation_pairs, progress=lambda share: bar.update(job, completed=share)
         )
         bar.remove_task(job)
-        content = both.to_plain()
-        count = self.config.evaluation_pairs
-        parts = {
-            "pairs": {k: v[:count] if isinstance(v, list) else v for k, v in content.items()},
-            "table": {k: v[count:] if isinstance(v, list) else v for k, v in content.items()},
-        }
-        self.run.write_json(name, parts)
-        return Yardstick.from_plain(self.task, parts["pairs"]), Yardstick.from_plain(self.task, parts["table"])
+        self.run.write_json("evaluation.json", {"pairs": pairs.to_plain(), "table": table.to_plain()})
+        return pairs, table
 
     def policy(self, model: OneStepSAC, result: dict[str, Any]) -> Policy:
         """The mean of the policy, out of torch."""
@@ -212,11 +193,8 @@ class _Run:
         weights = tuple(layer.weight.detach().numpy().T.astype(float) for layer in layers)
         biases = tuple(layer.bias.detach().numpy().astype(float) for layer in layers)
         manifest = {
-            "plant": self.plant.identity(),
-            "driven": list(self.task.driven),
-            "variant": self.config.variant,
-            "weights": asdict(self.task.weights),
-            "band": self.task.band,
+            "case": self.config.case,
+            "task": self.task.identity(),
             "config": asdict(self.config),
             "versions": versions(),
             "result": result,

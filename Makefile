@@ -1,0 +1,45 @@
+# Everything a newcomer needs: `make demo` and `make test`. Both make .venv first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+DEMO ?= demo
+
+.PHONY: help demo test check bench clean
+
+help:
+	@echo "make demo   install, identify the eye, train a saccade policy (minutes), picture and recording in $(DEMO)/"
+	@echo "make test   install and run all tests"
+	@echo "make check  ruff and the type checker"
+	@echo "make bench  speed of the plants and of the learning, as ratios"
+
+$(INSTALLED): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt torch==2.13.0
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,onnx,tensorboard]"
+	@touch $(INSTALLED)
+
+demo: $(INSTALLED)
+	@if [ -e "$(DEMO)" ]; then echo "$(DEMO)/ is there already; move it away, or make demo DEMO=another-folder"; exit 2; fi
+	$(BIN)/orient-eye sysid --out $(DEMO)/sysid
+	$(BIN)/orient-eye train --surrogate $(DEMO)/sysid/surrogate.json --updates 8000 --evaluation-pairs 100 --out $(DEMO)/train
+	@echo
+	@echo "Look at:"
+	@echo "  $(DEMO)/sysid/figure_3_5.png    gain K and cut-off w0 of the eye against step amplitude"
+	@echo "  $(DEMO)/train/policy.png        what the policy learned, beside the searched optimum; the main sequence"
+	@echo "  $(BIN)/orient-eye view $(DEMO)/train/recording.rrd    the saccades in 3-D, at several stages of training"
+
+test: $(INSTALLED)
+	$(BIN)/python -m pytest
+
+check: $(INSTALLED)
+	$(BIN)/ruff check src tests scripts benchmarks
+	$(BIN)/ruff format --check src tests scripts benchmarks
+	$(BIN)/mypy
+
+bench: $(INSTALLED)
+	$(BIN)/python benchmarks/plants.py
+	$(BIN)/python benchmarks/learning.py
+
+clean:
+	rm -rf $(VENV) $(DEMO) .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,423 @@
+"""Measures of a saccade: the closed form, the sampled form, and dense sampling as a witness of both."""
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from orient_eye.measures import BAND, Measures, measure, measure_response
+from orient_eye.plants.lpf import LowPassPlant
+from orient_eye.plants.mujoco import MujocoPlant
+from orient_eye.pulse_step import FIXED_C, PULSES, PulseStep, varying_C
+from orient_eye.rotations import FORWARD, angle_between, from_yaw, rotation, to_euler
+from orient_eye.surrogate import Surrogate
+from orient_eye.trajectory import EyeState, Trajectory
+
+Array = NDArray[np.float64]
+K, W0 = 1.4758, 17.5  # thesis 3.3.1
+PLANT = LowPassPlant(Surrogate(K, W0))
+SCALARS = ("amplitude_deg", "settling_time_s", "peak_velocity_deg_s", "overshoot", "skewness")
+
+
+def pulse_step(B: Array, step: Array, k0: Array, variant: int = 1, C: Array | float | None = None) -> PulseStep:
+    """One motor, from -step / 2 to step / 2."""
+    B, step, k0 = (np.atleast_1d(np.asarray(x, float))[:, None] for x in (B, step, k0))
+    C = C if C is None else np.atleast_1d(np.asarray(C, float))[:, None]
+    return PulseStep(-step / 2, B, step / 2, k0, variant, C)
+
+
+def random_pulse_steps(variant: int, count: int, seed: int = 0, *, varying: bool = True) -> PulseStep:
+    """From the whole range of actions, half of them near the cliff k0 = w0; C fixed, or half of them varying."""
+    rng = np.random.default_rng(seed)
+    B, step = rng.uniform(18, 80, count), rng.uniform(-60, 60, count)
+    k0 = np.where(np.arange(count) % 2, rng.uniform(5, 40, count), W0 + rng.uniform(-1.5, 0.2, count))
+    if variant not in FIXED_C:
+        return pulse_step(B, step, k0)
+    C = np.full(count, FIXED_C[variant])
+    if varying:
+        C[::4], C[1::4] = (varying_C(variant, step[i::4], B[i::4], k0[i::4]) for i in (0, 1))
+    return pulse_step(B, step, k0, variant, C)
+
+
+# --- the closed form ------------------------------------------------------------------------------
+
+
+def crest(x: Array) -> float:
+    """Top of the parabola through the largest sample and its neighbours."""
+    k = int(x.argmax())
+    if k in (0, len(x) - 1):
+        return float(x[k])
+    curve = np.polynomial.Polynomial.fit([-1, 0, 1], x[k - 1 : k + 2], 2, domain=[-1, 1])
+    return float(curve(curve.deriv().roots()[0].real)) if curve.coef[2] < 0 else float(x[k])
+
+
+@dataclass(frozen=True)
+class Dense:
+    """Measures of one saccade from 40 000 samples, refined by brentq."""
+
+    settling_time_s: float
+    peak_velocity_deg_s: float
+    overshoot: float
+    skewness: float
+
+    @classmethod
+    def of(cls, command: PulseStep, band: float) -> "Dense":
+        response = PLANT.respond(command)
+        t = np.linspace(0, 30 / min(command.B[0, 0], W0), 40_001)
+        start, final = response.start[0], response.final[0]
+
+        def progress(s: Array | float) -> Array:
+            return (response.yaw(np.atleast_1d(s)[None])[0] - start) / (final - start)
+
+        def acceleration(s: float) -> float:
+            return float(np.diff(response.rate(np.array([[s - 1e-6, s + 1e-6]]))[0])[0])
+
+        x, speed = progress(t), np.abs(response.rate(t[None])[0])
+        top = int(speed.argmax())
+        peak = 0.0 if top == 0 else brentq(acceleration, t[top - 1], t[top + 1], xtol=1e-13)
+        k = int(np.flatnonzero(np.abs(x - 1) > band)[-1])
+        settling = brentq(lambda s: np.abs(progress(s)[0] - 1) - band, t[k], t[k + 1], xtol=1e-15)
+        return cls(
+            settling_time_s=settling,
+            peak_velocity_deg_s=float(np.abs(response.rate(np.array([[peak]])))[0, 0]),
+            overshoot=max(crest(x), 1.0) - 1,
+            skewness=max(settling - peak, 0.0) / settling,
+        )
+
+
+def assert_like_dense(command: PulseStep, band: float = BAND) -> None:
+    found = measure_response(PLANT.respond(command), band=band)
+    assert found.settled.all()
+    assert not found.failed.any()
+    for i in range(len(found.failed)):
+        alone = replace_rows(command, i)
+        dense = Dense.of(alone, band)
+        context = f"B {alone.B}, step {alone.step}, k0 {alone.k0}, C {alone.C}"
+        assert found.settling_time_s[i] == pytest.approx(dense.settling_time_s, rel=0, abs=1e-10), context
+        assert found.peak_velocity_deg_s[i] == pytest.approx(dense.peak_velocity_deg_s, rel=1e-9), context
+        assert found.overshoot[i] == pytest.approx(dense.overshoot, rel=0, abs=1e-9), context
+        assert found.skewness[i] == pytest.approx(dense.skewness, rel=0, abs=1e-6), context
+
+
+def replace_rows(command: PulseStep, i: int) -> PulseStep:
+    rows = slice(i, i + 1)
+    C = None if command.variant == 1 else np.asarray(command.C)[rows]
+    return PulseStep(command.F[rows], command.B[rows], command.D[rows], command.k0[rows], command.variant, C)
+
+
+@pytest.mark.parametrize("variant", PULSES)
+@pytest.mark.parametrize("band", [BAND, 0.00707, 0.05])
+def test_closed_form_against_dense_sampling(variant: int, band: float) -> None:
+    assert_like_dense(random_pulse_steps(variant, 8, seed=round(1e5 * band)), band)
+
+
+@pytest.mark.parametrize("B", [12.0, 17.5, 17.5 + 1e-9, 80.0, 300.0])
+def test_closed_form_at_the_edges(B: float) -> None:
+    """B at and below w0, k0 = w0 exactly, the ends of k0."""
+    k0 = np.array([5.0, 17.5, 17.5 - 1e-9, 40.0])
+    assert_like_dense(pulse_step(np.full(4, B), np.array([20.0, -20.0, 60.0, 0.1]), k0))
+
+
+def overshoot_of(k0: float, B: float) -> float:
+    return float(measure_response(PLANT.respond(pulse_step(B, 20.0, k0))).overshoot[0])
+
+
+@pytest.mark.parametrize("B", [18.0, 35.0, 60.0, 80.0])
+@pytest.mark.parametrize("excess", [1e-3, 1e-5, 1e-7, -1e-7, -1e-5, -1e-3])
+def test_settling_jumps_where_the_overshoot_leaves_the_band(B: float, excess: float) -> None:
+    """The one jump of the settling time in the action (thesis Figure 4.9): at an overshoot of one band.
+
+    An overshoot of more than the band, by ever so little, must be seen: else it would pay to hide there.
+    """
+    k0 = brentq(lambda k: overshoot_of(k, B) - BAND - excess, 8, 17.49, xtol=1e-13)
+    response = PLANT.respond(pulse_step(B, 20.0, k0))
+    settling = measure_response(response).settling_time_s[0]
+    t = np.linspace(0, 1.5, 100_001)
+    x = response.motion(t[None])[0][0]
+    crest = t[x.argmax()]
+    assert x.max() - 1 - BAND == pytest.approx(excess, rel=1e-2, abs=1e-9)
+    if excess > 0:
+        assert settling > crest
+    else:
+        assert settling < crest
+
+
+@pytest.mark.parametrize("variant", PULSES)
+def test_settling_is_continuous_in_the_action(variant: int) -> None:
+    """Along random lines through the actions; only where the overshoot crosses the band may it jump."""
+    rng = np.random.default_rng(5)
+    share = np.linspace(0, 1, 4001)
+    for _ in range(3):
+        ends = rng.uniform([18, 5, 5], [80, 40, 40], (2, 3))
+        B, step, k0 = (ends[0] + share[:, None] * (ends[1] - ends[0])).T
+        C = None if variant == 1 else varying_C(variant, step, B, k0)
+        found = measure_response(PLANT.respond(pulse_step(B, step, k0, variant, C)))
+        change = np.abs(np.diff(found.settling_time_s))
+        crossing = np.diff((found.overshoot > BAND).astype(int)) != 0
+        assert (change[~crossing] < 1e-3).all()
+        assert crossing.sum() <= 2
+
+
+def test_mirrored_saccades_measure_alike() -> None:
+    command = random_pulse_steps(1, 20)
+    one, other = (
+        measure_response(PLANT.respond(PulseStep(s * command.F, command.B, s * command.D, command.k0)))
+        for s in (1, -1)
+    )
+    for name in SCALARS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_closed_form_of_no_movement() -> None:
+    found = measure_response(PLANT.respond(pulse_step(np.array([35.0]), np.array([0.0]), np.array([17.5]))))
+    assert found.amplitude_deg == found.settling_time_s == found.peak_velocity_deg_s == found.overshoot == 0
+    assert np.isnan(found.skewness).all()
+    assert found.settled.all()
+    assert not found.failed.any()
+    np.testing.assert_array_equal(found.at_settling, found.final)
+
+
+# --- the sampled form -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("variant", PULSES)
+def test_sampled_form_agrees_with_the_closed_form(variant: int) -> None:
+    """At 1 ms: what interpolation leaves is of second order in the sampling."""
+    command = random_pulse_steps(variant, 60, seed=3, varying=False)  # a varying C can peak within 1 ms
+    closed = measure_response(PLANT.respond(command))
+    # Where the overshoot ends within a sample's curvature of the band, the two may see different exits.
+    clear = np.abs(closed.overshoot - BAND) > 1e-5
+    assert clear.sum() > 50
+    for samples, step_s, shrink in ((1201, 0.001, 1.0), (12001, 0.0001, 0.012)):
+        plant = LowPassPlant(Surrogate(K, W0), step_s=step_s)
+        sampled = measure(plant.trajectory(command, samples), from_yaw(K * command.D[:, 0]))
+        assert sampled.settled.all()
+        assert not sampled.failed.any()
+        np.testing.assert_allclose(sampled.amplitude_deg, closed.amplitude_deg, rtol=1e-12)
+        error = {name: np.abs(getattr(sampled, name) - getattr(closed, name))[clear] for name in SCALARS}
+        assert error["settling_time_s"].max() < 2e-5 * shrink
+        assert (error["peak_velocity_deg_s"] / closed.peak_velocity_deg_s[clear]).max() < 2e-4 * shrink
+        assert error["overshoot"].max() < 2e-5 * shrink
+        assert error["skewness"].max() < 3e-3 * shrink
+        apart = angle_between(sampled.at_settling, closed.at_settling)[clear]
+        assert (apart / closed.amplitude_deg[clear]).max() < 2e-5 * shrink
+
+
+def test_orientation_at_settling_is_one_band_from_the_end() -> None:
+    command = random_pulse_steps(1, 40, seed=4)
+    for found in (
+        measure_response(PLANT.respond(command)),
+        measure(PLANT.trajectory(command, 1201), from_yaw(K * command.D[:, 0])),
+    ):
+        share = angle_between(found.at_settling, found.final) / found.amplitude_deg
+        np.testing.assert_allclose(share, BAND, rtol=1e-6)
+
+
+def test_settling_of_samples_is_interpolated() -> None:
+    """A straight line in time, so that linear interpolation is exact: 10 deg in 0.1 s, band 1 %."""
+    time = 0.001 * np.arange(201)
+    yaw = np.minimum(100 * (time - 0.0003), 10.0).clip(0)[None]
+    found = measure(by_yaw(time, yaw))
+    assert found.settling_time_s[0] == pytest.approx(0.0993, abs=1e-12)
+    np.testing.assert_allclose(to_euler(found.at_settling)[0], 9.9, atol=1e-9)
+    assert measure(by_yaw(time, yaw), band=0.25).settling_time_s[0] == pytest.approx(0.0753, abs=1e-12)
+
+
+def by_yaw(time: Array, yaw: Array, velocity: Array | None = None) -> Trajectory:
+    """A horizontal trajectory from yaw (saccades, time)."""
+    velocity = np.gradient(yaw, time, axis=1) if velocity is None else velocity
+    omega = np.stack([np.zeros_like(yaw), np.zeros_like(yaw), velocity], axis=-1)
+    return Trajectory(time, from_yaw(yaw), omega, yaw[..., None], None, np.zeros(len(yaw), bool), ("motor2",))
+
+
+def test_overshoot_and_peak_between_samples() -> None:
+    """Parabolas, sampled off their tops: exact."""
+    time = 0.01 * np.arange(101)
+    velocity = np.maximum(300 - 2e4 * (time - 0.0531) ** 2, 0)
+    crest = 10.8 - 5 * (time - 0.2537) ** 2
+    yaw = np.where(time < 0.5, crest, 10.0)
+    yaw[0] = 0.0
+    found = measure(by_yaw(time, yaw[None], velocity[None]))
+    assert found.peak_velocity_deg_s[0] == pytest.approx(300, rel=1e-12)
+    assert found.overshoot[0] == pytest.approx(0.08, rel=1e-9)
+    settling = found.settling_time_s[0]
+    assert found.skewness[0] == pytest.approx((settling - 0.0531) / settling, rel=1e-12)
+
+
+def test_not_settled_within_the_horizon() -> None:
+    command = pulse_step(np.array([35.0, 35.0]), np.array([20.0, 20.0]), np.array([17.5, 6.0]))
+    final = from_yaw(K * command.D[:, 0])
+    long, short = (measure(PLANT.trajectory(command, n), final) for n in (1201, 201))
+    assert long.settled.tolist() == [True, True]
+    assert 0.15 < long.settling_time_s[0] < 0.2 < long.settling_time_s[1]
+    assert short.settled.tolist() == [True, False]
+    assert short.settling_time_s[0] == long.settling_time_s[0]
+    assert short.settling_time_s[1] == 0.2  # the horizon
+    assert not short.failed.any()
+
+
+def test_no_movement_from_samples() -> None:
+    still = by_yaw(0.001 * np.arange(50), np.full((1, 50), 7.0), np.zeros((1, 50)))
+    found = measure(still)
+    assert found.amplitude_deg == found.settling_time_s == found.peak_velocity_deg_s == found.overshoot == 0
+    assert np.isnan(found.skewness).all()
+    assert found.settled.all()
+    assert not found.failed.any()
+    np.testing.assert_allclose(found.at_settling, from_yaw([7.0]), atol=1e-15)
+
+
+def equal(one: Measures, other: Measures) -> None:
+    for name in vars(one):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+def rows_of(found: Measures, rows: list[int]) -> Measures:
+    return Measures(**{name: value[rows] for name, value in vars(found).items()})
+
+
+def test_failed_saccades_are_nan_and_stay_alone() -> None:
+    command = random_pulse_steps(1, 4, seed=6)
+    trajectory, final = PLANT.trajectory(command, 601), from_yaw(K * command.D[:, 0])
+    for broken in (np.nan, 0.5):  # numbers that are none, or any numbers of a saccade marked failed
+        q, omega, failed = trajectory.orientation.copy(), trajectory.angular_velocity.copy(), trajectory.failed.copy()
+        q[2], omega[2], failed[2] = broken, broken, True
+        found = measure(replace(trajectory, orientation=q, angular_velocity=omega, failed=failed), final)
+        assert found.failed.tolist() == [False, False, True, False]
+        assert not found.settled[2]
+        for name in (*SCALARS, "final", "at_settling"):
+            assert np.isnan(getattr(found, name)[2]).all(), name
+        keep = [0, 1, 3]
+        equal(rows_of(found, keep), measure(trajectory[np.array(keep)], final[keep]))
+
+
+def test_a_final_orientation_that_is_none_fails_alone() -> None:
+    command = random_pulse_steps(1, 3, seed=7)
+    trajectory, final = PLANT.trajectory(command, 601), from_yaw(K * command.D[:, 0])
+    final[1] = np.nan
+    found = measure(trajectory, final)
+    assert found.failed.tolist() == [False, True, False]
+    equal(rows_of(found, [0, 2]), measure(trajectory[np.array([0, 2])], final[[0, 2]]))
+
+
+def test_closed_form_of_a_command_that_is_none_fails_alone() -> None:
+    good = pulse_step(np.array([35.0, 40.0]), np.array([20.0, -9.0]), np.array([17.5, 12.0]))
+    bad = pulse_step(np.array([35.0, np.nan, 40.0]), np.array([20.0, 10.0, -9.0]), np.array([17.5, 17.5, 12.0]))
+    found = measure_response(PLANT.respond(bad))
+    assert found.failed.tolist() == [False, True, False]
+    for name in SCALARS:
+        assert np.isnan(getattr(found, name)[1]).all(), name
+    equal(rows_of(found, [0, 2]), measure_response(PLANT.respond(good)))
+
+
+def test_without_a_final_orientation_the_last_sample_counts() -> None:
+    trajectory = PLANT.trajectory(random_pulse_steps(1, 3, seed=8), 901)
+    equal(measure(trajectory), measure(trajectory, trajectory.orientation[:, -1]))
+
+
+# --- in three dimensions --------------------------------------------------------------------------
+
+
+@functools.cache
+def oblique() -> tuple[Trajectory, Array]:
+    """Saccades of all three motors in MuJoCo, curved and with torsion, and their ends."""
+    rng = np.random.default_rng(2)
+    plant = MujocoPlant(threads=1)
+    F, D = rng.uniform(-12, 12, (2, 8, 3))
+    command = PulseStep(F, rng.uniform(25, 70, (8, 3)), D, rng.uniform(8, 25, (8, 3)))
+    trajectory = plant.simulate(command.sample(plant.step_s, 1801))  # torsion takes long
+    return trajectory, plant.rest_orientation(D)
+
+
+@settings(deadline=None, max_examples=30, derandomize=True)
+@given(
+    axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),
+    angle=st.floats(-180, 180),
+    about_the_eye=st.booleans(),
+    flips=st.integers(0, 2**30),
+)
+def test_rotating_everything_changes_no_measure(
+    axis: tuple[float, float, float],
+    angle: float,
+    about_the_eye: bool,
+    flips: int,
+) -> None:
+    """Another head frame (R q), another eye frame (q R), and -q for q at any sample: the same saccade."""
+    trajectory, final = oblique()
+    fixed = Rotation.from_rotvec(np.deg2rad(angle) * np.array(axis) / np.linalg.norm(axis))
+    sign = np.random.default_rng(flips).choice([-1.0, 1.0], (*trajectory.orientation.shape[:2], 1))
+
+    def turn(q: Array) -> Array:
+        product = rotation(q.reshape(-1, 4)) * fixed if about_the_eye else fixed * rotation(q.reshape(-1, 4))
+        return np.asarray(product.as_quat(scalar_first=True)).reshape(q.shape)
+
+    omega = trajectory.angular_velocity
+    if not about_the_eye:
+        omega = fixed.apply(omega.reshape(-1, 3)).reshape(omega.shape)
+    turned = replace(trajectory, orientation=sign * turn(trajectory.orientation), angular_velocity=omega)
+    one, other = measure(trajectory, final), measure(turned, -turn(final))
+    assert one.settled.all()
+    for name in SCALARS:
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=1e-7, atol=1e-9, err_msg=name)
+    np.testing.assert_allclose(angle_between(other.at_settling, turn(one.at_settling)), 0, atol=1e-6)
+
+
+def test_amplitude_in_three_dimensions() -> None:
+    trajectory, final = oblique()
+    apart = (rotation(final) * rotation(trajectory.orientation[:, 0]).inv()).magnitude()
+    np.testing.assert_allclose(measure(trajectory, final).amplitude_deg, np.rad2deg(apart), rtol=1e-12)
+
+
+@pytest.mark.parametrize("axis", [(0.0, 1, 0), (0.6, 0, 0.8), (1 / 3, -2 / 3, 2 / 3)])
+def test_a_turn_about_a_fixed_axis_measures_like_a_horizontal_one(axis: tuple[float, float, float]) -> None:
+    """Through an angle that is the closed-form yaw: the axis does not matter."""
+    command = random_pulse_steps(1, 12, seed=9)
+    flat, final = PLANT.trajectory(command, 1201), from_yaw(K * command.D[:, 0])
+    yaw = PLANT.respond(command).yaw(flat.time[None])
+
+    def about(angle: Array) -> Array:
+        turned = Rotation.from_rotvec(np.deg2rad(angle).reshape(-1, 1) * np.array(axis))
+        return np.asarray(turned.as_quat(scalar_first=True)).reshape(*angle.shape, 4)
+
+    tilted = replace(
+        flat, orientation=about(yaw), angular_velocity=np.linalg.norm(flat.angular_velocity, axis=-1)[..., None] * axis
+    )
+    one, other = measure(flat, final), measure(tilted, about(K * command.D[:, 0]))
+    for name in SCALARS:
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=1e-9, atol=1e-11, err_msg=name)
+
+
+def test_overshoot_counts_only_along_the_saccade() -> None:
+    """A detour to the side is none; going past the end by a tenth is one of 0.1."""
+    time = 0.001 * np.arange(401)
+    along = 10 * np.minimum(time / 0.1, 1)
+    hump = np.exp(-(((time - 0.2) / 0.02) ** 2))
+
+    def moving(yaw: Array, pitch: Array) -> Trajectory:
+        turned = Rotation.from_rotvec(np.deg2rad(np.stack([0 * yaw, pitch, yaw], axis=-1)))
+        q = np.asarray(turned.as_quat(scalar_first=True))[None]
+        return replace(by_yaw(time, yaw[None]), orientation=q)
+
+    aside = measure(moving(along, 2 * hump))
+    past = measure(moving(along + hump, 0 * hump))
+    assert aside.overshoot[0] < 1e-3
+    assert past.overshoot[0] == pytest.approx(0.1, rel=1e-3)
+    assert aside.settling_time_s[0] > 0.2  # but it keeps the eye out of the band
+    np.testing.assert_allclose(aside.amplitude_deg, 10, rtol=1e-12)
+
+
+def test_mujoco_settles_where_the_equilibrium_is() -> None:
+    """The settled end of a simulated saccade is `rest_orientation`, so that either may be the final one."""
+    plant = MujocoPlant(threads=1)
+    step: Callable[[float], Array] = lambda angle: np.tile([0.0, angle, 0.0], (1, 1501, 1))  # noqa: E731
+    trajectory = plant.simulate(step(14.0), EyeState(FORWARD[None]))
+    rest = plant.rest_orientation(np.array([[0.0, 14.0, 0.0]]))
+    by_end, by_rest = measure(trajectory), measure(trajectory, rest)
+    for name in SCALARS:
+        np.testing.assert_allclose(getattr(by_end, name), getattr(by_rest, name), rtol=1e-5, atol=1e-6, err_msg=name)

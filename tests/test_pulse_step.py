@@ -1,0 +1,492 @@
+"""The pulse-step command and its low-pass response, against quadrature and the thesis' own formulas.
+
+The witnesses below are written from the definitions: f(t) of each variant, A from D (thesis 4.9, 4.15 and
+the corrected 4.24), tau = F + p + k0 integral p (4.1), theta' = w0 (K tau - theta) (3.11).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.optimize import brentq, minimize_scalar
+from scipy.special import gammainc
+
+from orient_eye.errors import InputError
+from orient_eye.plants.lpf import LowPassPlant
+from orient_eye.pulse_step import FIXED_C, PULSES, SPEED_LIMIT, PulseStep, varying_C
+from orient_eye.surrogate import Surrogate
+
+Array = NDArray[np.float64]
+K, W0 = 1.4758, 17.5  # thesis 3.3.1
+PLANT = LowPassPlant(Surrogate(K, W0))
+
+properties = settings(deadline=None, max_examples=40, derandomize=True)
+angle = st.floats(-80, 80)
+decay = st.floats(5, 80)
+gain = st.floats(5, 40)
+onset = st.floats(0.18, 500)
+
+
+@dataclass(frozen=True)
+class Plain:
+    """One motor, one saccade, from the definitions."""
+
+    variant: int
+    F: float
+    B: float
+    D: float
+    k0: float
+    C: float = 1.0
+
+    @property
+    def A(self) -> float:
+        """Thesis 4.9, 4.15, and 4.24 with B (B + C)^2."""
+        B, C = self.B, self.C
+        by_step = {1: B**2 / self.k0, 2: B * (B + C) / (C * self.k0), 3: B * (B + C) ** 2 / (C**2 * self.k0)}
+        return (self.D - self.F) * by_step[self.variant]
+
+    def onset(self, t: float) -> float:
+        """f(t): t (4.3), 1 - e^(-Ct) (4.10), 1 - e^(-Ct) - Ct e^(-Ct) (4.19); without cancellation."""
+        forms = {1: lambda: t, 2: lambda: -np.expm1(-self.C * t), 3: lambda: gammainc(2, self.C * t)}
+        return float(forms[self.variant]())
+
+    def onset_rate(self, t: float) -> float:
+        C = self.C
+        forms = {1: lambda: 1.0, 2: lambda: C * np.exp(-C * t), 3: lambda: C**2 * t * np.exp(-C * t)}
+        return float(forms[self.variant]())
+
+    def pulse(self, t: float) -> float:
+        return self.A * np.exp(-self.B * t) * self.onset(t)
+
+    def pulse_area(self, t: float) -> float:
+        return integral(self.pulse, t, self.knots)
+
+    def tau(self, t: float) -> float:
+        return self.F + self.pulse(t) + self.k0 * self.pulse_area(t)
+
+    def rate(self, t: float) -> float:
+        slope = self.A * np.exp(-self.B * t) * (self.onset_rate(t) - self.B * self.onset(t))
+        return float(slope + self.k0 * self.pulse(t))
+
+    def energy(self) -> float:
+        return integral(lambda t: self.rate(t) ** 2, 45 / (2 * self.B), self.knots)
+
+    def theta(self, t: float, K: float = K, w0: float = W0) -> float:
+        """K F e^(-w0 t) + K w0 integral of tau(s) e^(-w0 (t - s)), with tau by parts, so one integral does.
+
+        The response to k0 times the integral P of p is k0 (P - y / w0) with y the response to p.
+        """
+        y = integral(lambda s: w0 * self.pulse(s) * np.exp(-w0 * (t - s)), t, [*self.knots, t - 1 / w0])
+        return K * (self.F + y + self.k0 * (self.pulse_area(t) - y / w0))
+
+    @property
+    def knots(self) -> list[float]:
+        """Where the pulse bends, for the quadrature."""
+        return [x / r for x in (0.3, 1, 3, 10) for r in (self.B, self.B + self.C)]
+
+    def command(self) -> PulseStep:
+        F, B, D, k0 = (np.array([[x]]) for x in (self.F, self.B, self.D, self.k0))
+        return PulseStep(F, B, D, k0, self.variant, None if self.variant == 1 else self.C)
+
+
+def integral(f: Callable[[float], float], end: float, knots: list[float]) -> float:
+    points = sorted({k for k in knots if 0 < k < end})
+    return float(quad(f, 0, end, points=points or None, epsabs=0, epsrel=1e-12, limit=400)[0])
+
+
+def times(plain: Plain) -> Array:
+    return np.concatenate([[0, 1e-6], np.array([0.05, 0.3, 1, 2, 5, 12]) / plain.B])
+
+
+def assert_over_time(found: Array, exact: Callable[[float], float], at: Array, peak: float) -> None:
+    """To 1e-9 of the peak magnitude."""
+    np.testing.assert_allclose(found, [exact(float(t)) for t in at], rtol=0, atol=1e-9 * peak)
+
+
+def hold_against_quadrature(plain: Plain) -> None:
+    command, at = plain.command(), times(plain)
+    fine = np.geomspace(1e-7, 12 / plain.B, 2000)
+    step = abs(plain.D - plain.F)
+    pulse, tau, rate = command.pulse(at), command.position(at), command.rate(at)
+    assert pulse.shape == tau.shape == rate.shape == (1, len(at), 1)
+    assert_over_time(pulse[0, :, 0], plain.pulse, at, np.abs(command.pulse(fine)).max())
+    assert_over_time(tau[0, :, 0] - plain.F, lambda t: plain.tau(t) - plain.F, at, step)
+    assert_over_time(rate[0, :, 0], plain.rate, at, np.abs(command.rate(fine)).max())
+    assert command.energy().shape == (1,)
+    assert command.energy()[0] == pytest.approx(plain.energy(), rel=1e-9, abs=0)
+    yaw = PLANT.respond(command).yaw(at[None])
+    assert_over_time(yaw[0] - K * plain.F, lambda t: plain.theta(t) - K * plain.F, at, K * step)
+
+
+# --- against quadrature ---------------------------------------------------------------------------
+
+ONSETS: dict[int, tuple[float, ...]] = {1: (1.0,), 2: (0.3, 3.6, 85.0, 142.0, 5000.0), 3: (0.9, 3.6, 85.0, 5000.0)}
+CASES = [(variant, C) for variant, onsets in ONSETS.items() for C in onsets]
+
+
+@pytest.mark.parametrize(("variant", "C"), CASES)
+@pytest.mark.parametrize("B", [5.0, 17.4, 35.0, 80.0])
+def test_against_quadrature(variant: int, C: float, B: float) -> None:
+    """B below and above w0 = 17.5, k0 below, at and above it."""
+    for F, D, k0 in ((0.0, 20.33, 17.5), (-12.0, 9.5, 5.0), (20.0, -23.0, 40.0)):
+        hold_against_quadrature(Plain(variant, F, B, D, k0, C))
+
+
+@pytest.mark.parametrize("variant", PULSES)
+@pytest.mark.parametrize("gap", [0.0, *(sign * 10.0**-k for k in range(3, 13) for sign in (1, -1))])
+def test_against_quadrature_where_a_pole_meets_w0(variant: int, gap: float) -> None:
+    """B = w0, and B + C = w0, exactly and nearly: there the partial fractions divide zero by zero."""
+    for k0 in (12.0, 17.5):
+        hold_against_quadrature(Plain(variant, 3.0, W0 + gap, 21.0, k0, 3.6))
+        if variant in FIXED_C:
+            C = 3.6
+            hold_against_quadrature(Plain(variant, 3.0, W0 + gap - C, 21.0, k0, C))
+
+
+@properties
+@given(variant=st.sampled_from(list(PULSES)), F=angle, B=decay, D=angle, k0=gain, C=onset)
+def test_against_quadrature_anywhere(variant: int, F: float, B: float, D: float, k0: float, C: float) -> None:
+    if abs(D - F) > 1e-3 and C >= 0.01 * B:
+        hold_against_quadrature(Plain(variant, F, B, D, k0, C))
+
+
+@pytest.mark.parametrize("variant", FIXED_C)
+@pytest.mark.parametrize("B", [18.0, 35.0, 80.0])
+@pytest.mark.parametrize("step", [1e-6, 0.1, 1.0, 5.0, 20.33, 60.0, 160.0])
+def test_varying_C_keeps_the_accuracy(variant: int, B: float, step: float) -> None:
+    """Also for the smallest saccades, whose C is smallest in variant 3 and largest in variant 2."""
+    for k0 in (5.0, 17.5, 40.0):
+        C = varying_C(variant, np.array(step), np.array(B), np.array(k0))
+        hold_against_quadrature(Plain(variant, 0.0, B, step, k0, float(C)))
+
+
+@properties
+@given(variant=st.sampled_from(list(PULSES)), F=angle, B=decay, D=angle, k0=gain, C=onset)
+def test_energy_by_parseval(variant: int, F: float, B: float, D: float, k0: float, C: float) -> None:
+    """Integral of |s tau(s)|^2 along the imaginary axis, by the classical table for 2nd and 3rd order."""
+    step, q = D - F, B + (0 if variant == 1 else C)
+    if variant == 3:  # s tau = A C^2 (s + k0) / ((s + B) (s + q)^2), 4.21
+        exact = step**2 * B * q * (B * q**2 + k0**2 * (B + 2 * q)) / (4 * k0**2 * (B + q) ** 2)
+    else:  # A C (s + k0) / ((s + B) (s + q)), 4.12; variant 1 is its limit q = B, 4.4
+        exact = step**2 * B * q * (B * q + k0**2) / (2 * k0**2 * (B + q))
+    if C >= 0.01 * B:
+        assert Plain(variant, F, B, D, k0, C).command().energy()[0] == pytest.approx(exact, rel=1e-9, abs=0)
+
+
+@pytest.mark.parametrize(("variant", "C"), CASES)
+def test_rate_is_the_slope_of_the_position(variant: int, C: float) -> None:
+    """The integral of `rate` is `position`, both of the class: they are computed apart."""
+    command = Plain(variant, -5.0, 40.0, 15.0, 12.0, C).command()
+    for end in (0.004, 0.03, 0.2):
+        area = integral(lambda t: command.rate([t])[0, 0, 0], end, [x / r for x in (0.3, 1, 3) for r in (40, 40 + C)])
+        assert command.position([end])[0, 0, 0] == pytest.approx(-5.0 + area, rel=0, abs=1e-9 * 20)
+
+
+# --- ends and shapes ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("variant", "C"), CASES)
+def test_starts_at_F_and_ends_at_D(variant: int, C: float) -> None:
+    for F, D in ((-12.0, 9.5), (20.0, -23.0), (7.0, 7.0)):
+        command = Plain(variant, F, 20.0, D, 12.0, C).command()
+        start, end = command.position([0.0, 40.0])[0, :, 0]
+        assert start == F
+        assert end == pytest.approx(D, rel=0, abs=1e-11 * 45)
+        assert command.pulse([0.0])[0, 0, 0] == pytest.approx(0, abs=1e-12 * abs(Plain(variant, F, 20, D, 12, C).A))
+        response = PLANT.respond(command)
+        np.testing.assert_allclose([response.start[0], response.final[0]], [K * F, K * D], rtol=1e-15)
+        yaw = response.yaw(np.array([[0.0, 40.0]]))[0]
+        np.testing.assert_allclose(yaw, [K * F, K * D], rtol=0, atol=1e-11 * 45)
+
+
+@properties
+@given(variant=st.sampled_from(list(PULSES)), F=angle, B=decay, D=angle, k0=gain, C=onset)
+def test_energy_goes_with_the_square_of_the_step(
+    variant: int, F: float, B: float, D: float, k0: float, C: float
+) -> None:
+    unit = Plain(variant, 0.0, B, 1.0, k0, C).command().energy()[0]
+    assert Plain(variant, F, B, D, k0, C).command().energy()[0] == pytest.approx((D - F) ** 2 * unit, rel=1e-14)
+    assert Plain(variant, -F, B, -D, k0, C).command().energy()[0] == pytest.approx((D - F) ** 2 * unit, rel=1e-14)
+
+
+def test_batch_shapes_and_motors() -> None:
+    """(saccades, time, motors); each motor as if alone, the energies of the motors summed."""
+    rng = np.random.default_rng(0)
+    F, D = rng.uniform(-20, 20, (2, 4, 3))
+    B, k0, C = rng.uniform(20, 80, (4, 3)), rng.uniform(5, 40, (4, 3)), rng.uniform(1, 90, (4, 3))
+    t = np.linspace(0, 0.3, 7)
+    for variant in PULSES:
+        command = PulseStep(F, B, D, k0, variant, C)
+        for name in ("pulse", "position", "rate"):
+            batch = getattr(command, name)(t)
+            assert batch.shape == (4, 7, 3)
+            for i in range(4):
+                for j in range(3):
+                    alone = Plain(variant, F[i, j], B[i, j], D[i, j], k0[i, j], C[i, j]).command()
+                    np.testing.assert_array_equal(batch[i, :, j], getattr(alone, name)(t)[0, :, 0])
+        energy = [
+            sum(Plain(variant, *(x[i, j] for x in (F, B, D, k0, C))).command().energy()[0] for j in range(3))
+            for i in range(4)
+        ]
+        np.testing.assert_allclose(command.energy(), energy, rtol=1e-14)
+        np.testing.assert_array_equal(command.sample(0.05, 7), command.position(0.05 * np.arange(7)))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"variant": 4}, r"unknown pulse variant 4.*\[1, 2, 3\]"),
+        ({"variant": 2}, r"variant 2 needs C; the thesis uses 85"),
+        ({"variant": 3}, r"variant 3 needs C; the thesis uses 3\.6"),
+        ({"B": [[35.0, 0.0]]}, "B must be positive, got 0"),
+        ({"k0": [[-1.0, 17.5]]}, "k0 must be positive, got -1"),
+        ({"variant": 2, "C": -3.0}, "C must be positive, got -3"),
+        ({"F": 0.0, "D": 20.0, "B": 35.0, "k0": 17.5}, r"\(saccades, motors\), got \(\)"),
+    ],
+)
+def test_bad_commands_are_refused(change: dict[str, Any], message: str) -> None:
+    good: dict[str, Any] = {"F": [[0.0, 0.0]], "B": [[35.0, 35.0]], "D": [[20.0, -5.0]], "k0": [[17.5, 17.5]]}
+    PulseStep(**good)
+    with pytest.raises(InputError, match=message):
+        PulseStep(**(good | change))
+
+
+# --- varying C ------------------------------------------------------------------------------------
+
+size = st.floats(0.02, 160)
+
+
+def top_speed(plain: Plain) -> float:
+    """Largest motor speed, by a dense scan and a local search."""
+    t = np.concatenate([[0], np.geomspace(1e-7, 20 / plain.B, 3000)])
+    speed = np.abs([plain.rate(float(s)) for s in t])
+    k = int(speed.argmax())
+    if k in (0, len(t) - 1):
+        return float(speed[k])
+    best = minimize_scalar(lambda s: -abs(plain.rate(s)), bounds=(t[k - 1], t[k + 1]), method="bounded")
+    return float(max(speed[k], -best.fun))
+
+
+def find_C(variant: int, step: float, B: float, k0: float, V: float = SPEED_LIMIT) -> float:
+    return float(varying_C(variant, np.array(step), np.array(B), np.array(k0), V))
+
+
+def bound_of_variant3(C: float, step: float, B: float, k0: float) -> float:
+    """A C / e + A k0 C^2 / (B + C)^2, thesis 4.31."""
+    A = abs(step) * B * (B + C) ** 2 / (C**2 * k0)
+    return A * C / np.e + A * k0 * C**2 / (B + C) ** 2
+
+
+@properties
+@given(step=size, B=st.floats(18, 80), k0=gain, V=st.sampled_from([720.0, 7200.0]))
+def test_variant2_starts_at_the_limit(step: float, B: float, k0: float, V: float) -> None:
+    """A C = V (thesis 4.18) where feasible; where not, the slowest onset comes nearest."""
+    C = find_C(2, step, B, k0, V)
+    initial = Plain(2, 0.0, B, step, k0, C).rate(0.0)
+    lowest = step * B**2 / k0  # A C for C -> 0
+    if lowest < V / 1.011:
+        assert pytest.approx(V / C, rel=1e-9) == Plain(2, 0.0, B, step, k0, C).A
+        assert initial == pytest.approx(V, rel=1e-9)
+        if k0 < 2 * B + C:  # else the speed still rises at t = 0
+            assert top_speed(Plain(2, 0.0, B, step, k0, C)) == pytest.approx(V, rel=1e-9)
+    else:
+        assert pytest.approx(0.01 * B, rel=1e-12) == C
+        assert lowest < initial <= 1.0101 * max(lowest, V)
+
+
+@properties
+@given(step=size, B=st.floats(18, 80), k0=gain, V=st.sampled_from([720.0, 7200.0]))
+def test_variant3_is_the_smaller_root_of_the_bound(step: float, B: float, k0: float, V: float) -> None:
+    """Thesis 4.31 by bracketing: the bound falls with C up to C = B, so that the smaller root is below B."""
+    C = find_C(3, step, B, k0, V)
+    if bound_of_variant3(B, step, B, k0) >= V:  # its least value
+        assert pytest.approx(B, rel=1e-12) == C
+        return
+    root = brentq(lambda c: bound_of_variant3(c, step, B, k0) - V, 1e-9, B, xtol=1e-14, rtol=1e-14)
+    if root > 0.011 * B:
+        assert pytest.approx(root, rel=1e-9) == C
+    assert root * (1 - 1e-9) <= C <= B
+    assert bound_of_variant3(C, step, B, k0) <= V * (1 + 1e-9)
+    assert top_speed(Plain(3, 0.0, B, step, k0, C)) <= V
+
+
+def test_the_limit_of_the_thesis_gives_C_142_not_85() -> None:
+    """4.18 with V = 7200 for the saccade of 4.4.5, B = 35, D - F = 20.33, k0 = 17.5."""
+    assert find_C(2, 20.33, 35.0, 17.5) == pytest.approx(142.07, abs=0.01)
+
+
+@pytest.mark.parametrize("variant", FIXED_C)
+def test_infeasible_commands_get_the_nearest_C(variant: int) -> None:
+    """B = 80, k0 = 5, 160 deg: no C keeps 7200 deg/s."""
+    step, B, k0 = 160.0, 80.0, 5.0
+    C = find_C(variant, step, B, k0)
+    assert pytest.approx({2: 0.01 * B, 3: B}[variant], rel=1e-12) == C
+    found = bound_of_variant3(C, step, B, k0) if variant == 3 else Plain(2, 0, B, step, k0, C).A * C
+    others = np.geomspace(0.01 * B, 100 * B, 500)
+    bounds = [bound_of_variant3(c, step, B, k0) if variant == 3 else Plain(2, 0, B, step, k0, c).A * c for c in others]
+    assert found > SPEED_LIMIT
+    assert found <= min(bounds) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("variant", FIXED_C)
+def test_varying_C_is_continuous(variant: int) -> None:
+    """In the step, through zero, both limits and the edge of what is feasible, and in B and k0."""
+    for B, k0 in ((80.0, 5.0), (35.0, 17.5), (18.0, 40.0)):
+        up = np.geomspace(1e-3, 400, 200_000)
+        step = np.concatenate([-up[::-1], up])
+        C = varying_C(variant, step, np.full_like(step, B), np.full_like(step, k0))
+        assert (C > 0).all()
+        np.testing.assert_array_equal(C, C[::-1])  # the direction does not matter
+        # The square root of variant 3 is steep at its edge: halving the steps must shrink the largest change.
+        coarse, fine = (np.abs(np.diff(np.log(C[:200_000][::n]))).max() for n in (64, 1))
+        assert fine < 0.2 * coarse
+        for name in ("B", "k0"):
+            near = {"B": B, "k0": k0}
+            near[name] *= 1 + 1e-10
+            moved = varying_C(variant, step, np.full_like(step, near["B"]), np.full_like(step, near["k0"]))
+            np.testing.assert_allclose(moved, C, rtol=1e-3)
+
+
+@pytest.mark.parametrize("variant", FIXED_C)
+def test_varying_C_without_a_step(variant: int) -> None:
+    """D = F: C at its bound, and a motor that does not move."""
+    C = find_C(variant, 0.0, 35.0, 17.5)
+    assert pytest.approx({2: 1e5, 3: 0.35}[variant]) == C
+    command = Plain(variant, 7.0, 35.0, 7.0, 17.5, C).command()
+    np.testing.assert_array_equal(command.position(np.linspace(0, 1, 20)), 7.0)
+    np.testing.assert_array_equal(command.rate(np.linspace(0, 1, 20)), 0.0)
+    assert command.energy()[0] == 0.0
+
+
+# --- the thesis' printed formulas -----------------------------------------------------------------
+
+SACCADES = [(0.0, 35.0, 20.33, 17.0), (-8.0, 60.0, 11.0, 9.0), (15.0, 22.0, -20.0, 31.0)]  # F, B, D, k0
+T = np.linspace(0, 0.4, 41)
+
+
+def agree(found: Array, formula: Array) -> bool:
+    """To 1e-9 of the formula's largest value; a misprint is off by far more."""
+    return bool(np.abs(found - formula).max() <= 1e-9 * np.abs(formula).max())
+
+
+def named(variant: int, saccade: tuple[float, float, float, float], C: float) -> tuple[Plain, Array, Array]:
+    """The plain form; our tau - F and theta - theta0 over T."""
+    plain = Plain(variant, *saccade, C)
+    command = plain.command()
+    theta = PLANT.respond(command).yaw(T[None])[0]
+    return plain, command.position(T)[0, :, 0] - plain.F, theta - K * plain.F
+
+
+@pytest.mark.parametrize("saccade", SACCADES)
+def test_formulas_of_variant_1(saccade: tuple[float, float, float, float]) -> None:
+    plain, tau, theta = named(1, saccade, 1.0)
+    A, B, k0, w0, t = plain.A, plain.B, plain.k0, W0, T
+    assert agree(  # 4.6
+        theta,
+        A * K * w0 * (
+            k0 / (B**2 * w0)
+            + (2 * B * k0 - B**2 - k0 * w0) / (B**2 * (B - w0) ** 2) * np.exp(-B * t)
+            + (k0 - B) / (-B * (w0 - B)) * t * np.exp(-B * t)
+            + (k0 - w0) / (-w0 * (B - w0) ** 2) * np.exp(-w0 * t)
+        ),
+    )  # fmt: skip
+    assert agree(  # 4.7, without its F
+        tau, A * (k0 / B**2 - k0 / B**2 * np.exp(-B * t) + (B - k0) / B * t * np.exp(-B * t))
+    )
+    # 4.36 at its lower limit; at infinity it vanishes.
+    at_0 = 1 / (-2 * B) + -2 * (B - k0) / (-4 * B**2) + 2 * (B - k0) ** 2 / (-8 * B**3)
+    assert plain.command().energy()[0] == pytest.approx(-(A**2) * at_0, rel=1e-12)
+
+
+@pytest.mark.parametrize("saccade", SACCADES)
+@pytest.mark.parametrize("C", [3.6, 85.0])
+def test_formulas_of_variant_2(saccade: tuple[float, float, float, float], C: float) -> None:
+    plain, tau, theta = named(2, saccade, C)
+    A, B, k0, w0, t = plain.A, plain.B, plain.k0, W0, T
+    assert agree(  # 4.14
+        theta,
+        A * C * K * w0 * (
+            k0 / (B * (B + C) * w0)
+            + (k0 - B) / (B * C * (B - w0)) * np.exp(-B * t)
+            + (k0 - (B + C)) / ((B + C) * C * (w0 - (B + C))) * np.exp(-(B + C) * t)
+            + (w0 - k0) / (w0 * (B - w0) * (B + C - w0)) * np.exp(-w0 * t)
+        ),
+    )  # fmt: skip
+    assert agree(  # 4.16
+        tau,
+        A * C * (
+            k0 / (B * (B + C))
+            + (B - k0) / (B * C) * np.exp(-B * t)
+            + (k0 - (B + C)) / ((B + C) * C) * np.exp(-(B + C) * t)
+        ),
+    )  # fmt: skip
+    assert agree(  # 4.17
+        plain.command().rate(T)[0, :, 0],
+        A * C * (-(B - k0) / C * np.exp(-B * t) - (k0 - (B + C)) / C * np.exp(-(B + C) * t)),
+    )
+    at_0 = (  # 4.37
+        (k0 - B) ** 2 / (-2 * B)
+        + 2 * (k0 - B) * (B + C - k0) / -(2 * B + C)
+        + (B + C - k0) ** 2 / (-2 * (B + C))
+    )
+    assert plain.command().energy()[0] == pytest.approx(A**2 * -at_0, rel=1e-9)
+
+
+@pytest.mark.parametrize("saccade", SACCADES)
+@pytest.mark.parametrize("C", [3.6, 85.0])
+def test_misprints_of_variant_3(saccade: tuple[float, float, float, float], C: float) -> None:
+    """4.23, 4.24, 4.27 and 4.38: as printed they do not agree, corrected they do."""
+    plain, tau, theta = named(3, saccade, C)
+    A, B, k0, w0, t = plain.A, plain.B, plain.k0, W0, T
+    q = B + C
+
+    # 4.23. The coefficient of the double pole's e^(-qt) is the derivative of the rest of theta(s) at -q.
+    at_q = (k0 - q) / (q * C * (w0 - q))
+    coefficient = at_q * (1 / (k0 - q) + 1 / q + 1 / C - 1 / (w0 - q))
+    printed = (-(q**2) + k0 * (B + 2 * C)) / (C**2 * q**2)
+
+    def theta_with(of_double_pole: float) -> Array:
+        return A * C**2 * K * w0 * (
+            k0 / (B * q**2 * w0)
+            + (k0 - B) / (-B * C**2 * (w0 - B)) * np.exp(-B * t)
+            + of_double_pole * np.exp(-q * t)
+            + at_q * t * np.exp(-q * t)
+            + (k0 - w0) / (-w0 * (B - w0) * (q - w0) ** 2) * np.exp(-w0 * t)
+        )  # fmt: skip
+
+    assert agree(theta, theta_with(coefficient))
+    assert not agree(theta, theta_with(printed))
+
+    # 4.24
+    step = plain.D - plain.F
+    reached = plain.command().position([50.0])[0, 0, 0] - plain.F
+    assert reached == pytest.approx(A * C**2 * k0 / (B * (B + C) ** 2), rel=1e-9)
+    assert reached == pytest.approx(step, rel=1e-9)
+    assert A * C**2 * k0 / (B * (B + C**2)) != pytest.approx(step, rel=0.01)
+
+    # 4.27: the step part of tau
+    stepped = tau - plain.command().pulse(T)[0, :, 0]
+
+    def step_with(onset: Array) -> Array:
+        return A * k0 * (C**2 / (B * q**2) - np.exp(-B * t) / B + onset * np.exp(-q * t))
+
+    assert agree(stepped, step_with((1 + C * t + C / q) / q))
+    assert not agree(stepped, step_with((1 + C * t + C * q) / q**2))
+
+    # 4.38 at its lower limit
+    a0, a1, a2 = (k0 - B) / C**2, (B - k0) / C**2, (B + C - k0) / C
+
+    def energy_with(sign: int) -> float:
+        crossed = 2 * a0 * a1 / -(2 * B + C) - 2 * a0 * a2 / (2 * B + C) ** 2
+        double = a1**2 / (-2 * q) - 2 * a2 * a1 / (4 * q**2) - 2 * a2**2 / (8 * q**3)
+        return -(A**2) * C**4 * (a0**2 / (-2 * B) + sign * crossed + double)
+
+    found = plain.command().energy()[0]
+    assert found == pytest.approx(energy_with(+1), rel=1e-8)  # the formula itself loses digits at C = 3.6
+    assert found != pytest.approx(energy_with(-1), rel=0.01)
