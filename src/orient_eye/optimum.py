@@ -41,8 +41,8 @@ def find_optimum(
     target: Array,
     random: np.random.Generator,
     *,
-    population: int = 36,
-    generations: int = 50,
+    population: int = 48,
+    generations: int = 60,
     progress: Callable[[float], None] | None = None,
 ) -> Optimum:
     """Search the best action of each saccade.

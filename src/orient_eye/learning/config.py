@@ -48,7 +48,7 @@ class TrainConfig:
     """Entropy temperature: first and last; it falls geometrically over the first 80 % of the run."""
     reward_scale: Literal["log", "raw"] = "log"
     """Learn on the logarithm of the reward, which has the same optimal policy, or on the reward itself."""
-    evaluation_pairs: Annotated[int | None, _default("300 on lpf, 100 on other plants")] = None
+    evaluation_pairs: Annotated[int | None, _default("300 on lpf, 60 on other plants")] = None
     """Random saccades held against the searched optimum."""
     seed: int = 0
     """Of everything random."""
@@ -64,7 +64,7 @@ class TrainConfig:
         defaults = {
             "weights": (weights.accuracy, weights.energy, weights.duration, weights.overshoot),
             "saccades_per_update": 128 if closed_form else 32,
-            "evaluation_pairs": 300 if closed_form else 100,
+            "evaluation_pairs": 300 if closed_form else 60,
         }
         config = replace(self, **{k: v for k, v in defaults.items() if getattr(self, k) is None})  # type: ignore[arg-type]
         for name in ("updates", "saccades_per_update", "batch_size", "replay_size", "warmup", "evaluation_pairs"):

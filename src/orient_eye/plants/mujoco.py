@@ -24,7 +24,7 @@ from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 _ACCURATE_SUBSTEPS = 5
-_RECORD_BYTES = 64e6  # of one chunk of saccades: stays near the caches, and bounds the memory
+_RECORD_BYTES = 8e6  # of one chunk of saccades: stays near the caches, and bounds the memory
 
 
 class MujocoPlant:
@@ -52,14 +52,17 @@ class MujocoPlant:
         if accurate:
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         self._model_hash = eyes.model_hash(self.model)
-        # Sensors are for the viewer; here the same quantities are recorded directly.
-        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
         eye_joint = self.model.joint("eye")
         self._eye_qpos = eye_joint.qposadr[0] + np.arange(4)
         self._eye_qvel = eye_joint.dofadr[0] + np.arange(3)
         hinges = [self.model.joint(self.model.actuator(name).trnid[0]) for name in self.motors]
         self._motor_qpos = np.array([hinge.qposadr[0] for hinge in hinges])
         self._motor_ctrl = np.array([self.model.actuator(name).id for name in self.motors])
+        # What is recorded is what the file's sensors measure: MuJoCo's threads then do all the work.
+        self._sensed_orientation = self._sensed("orientation")
+        self._sensed_velocity = self._sensed("angular_velocity")
+        lengths = [self._sensed(f"length_{name}") for name in self.tendons]
+        self._sensed_length = np.array([place.start for place in lengths])
         self._batches: dict[str, Batch] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -71,6 +74,11 @@ class MujocoPlant:
     def identity(self) -> dict[str, Any]:
         """Name, options and hash of the compiled model."""
         return {"plant": self.name, **self.options, "model": self._model_hash}
+
+    def _sensed(self, name: str) -> slice:
+        """Where a sensor's numbers are in sensordata."""
+        sensor = self.model.sensor(name)
+        return slice(int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
 
     def simulate(self, command: Array, start: EyeState | None = None) -> Trajectory:
         """Run a batch of saccades; see `orient_eye.plants.Plant.simulate`."""
@@ -102,7 +110,7 @@ class MujocoPlant:
         return result
 
     def _chunks(self, saccades: int, samples: int) -> Iterator[slice]:
-        row = 8 * (self.model.nq + self.model.nv + self.model.ntendon + self.model.nu)
+        row = 8 * (self.model.nsensordata + self.model.nu)
         size = max(1, int(_RECORD_BYTES / (row * samples * self.substeps)))
         for first in range(0, saccades, size):
             yield slice(first, min(first + size, saccades))
@@ -126,24 +134,28 @@ class MujocoPlant:
         eye_frame = rotation(orientation[part]).inv().apply(np.deg2rad(velocity[part]))
         batch.qvel[:, self._eye_qvel] = eye_frame
 
-        assert result.tension is not None
-        lengths = batch.bind("ten_length")
-        start_qpos, start_qvel = batch.qpos.copy(), batch.qvel.copy()
         steps = (samples - 1) * self.substeps
+        before_steps = np.empty((size, 0, self.model.nsensordata))
         if steps:
-            # An arm stands where ctrl says one step later, so each step is sent the next instant.
-            record = batch.rollout(steps, self._control(command), record=("qpos", "qvel", "ten_length"))
-            qpos = np.concatenate([start_qpos[:, None], record["qpos"][:, self.substeps - 1 :: self.substeps]], axis=1)
-            qvel = np.concatenate([start_qvel[:, None], record["qvel"][:, self.substeps - 1 :: self.substeps]], axis=1)
-            before_step = record["ten_length"][:, :: self.substeps]
-        else:
-            qpos, qvel, before_step = start_qpos[:, None], start_qvel[:, None], np.empty((size, 0, len(self.tendons)))
-        diverged = (batch.warning > 0).reshape(size, -1).any(axis=1) | ~np.isfinite(qpos).all(axis=(1, 2))
-        batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
-        result.failed[part] |= diverged
-        result.orientation[part] = qpos[..., self._eye_qpos]
-        result.angular_velocity[part] = _to_head_frame(qpos[..., self._eye_qpos], qvel[..., self._eye_qvel])
-        result.tension[part] = eyes.tendon_tension(self.model, np.concatenate([before_step, lengths[:, None]], axis=1))
+            # An arm stands where ctrl says one step later, so each step is sent the next instant. Sensors
+            # describe the state before a step; the last state is measured afterwards.
+            record = batch.rollout(steps, self._control(command), record=("sensordata",))
+            before_steps = record["sensordata"][:, :: self.substeps]
+        last = batch.bind("sensordata")
+        diverged = (batch.warning > 0).reshape(size, -1).any(axis=1)
+        batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL)
+        assert result.tension is not None
+        for output, sensed, convert in (
+            (result.orientation, self._sensed_orientation, lambda x: x),
+            (result.angular_velocity, self._sensed_velocity, np.rad2deg),
+            (result.tension, self._sensed_length, self._tension),
+        ):
+            output[part, :-1] = convert(before_steps[..., sensed])
+            output[part, -1] = convert(last[:, sensed])
+        result.failed[part] |= diverged | ~np.isfinite(result.orientation[part]).all(axis=(1, 2))
+
+    def _tension(self, length: Array) -> Array:
+        return eyes.tendon_tension(self.model, length)
 
     def _control(self, command: Array) -> Array:
         """Controls [rad] (saccades, steps, nu) that put the arms on the command."""
@@ -176,9 +188,3 @@ class MujocoPlant:
         """Motor positions that hold these orientations; see `orient_eye.plants.Plant`."""
         index = [self.motors.index(name) for name in driven]
         return equilibrium.rest_motor(self._torque, orientation, len(self.motors), index, self.motor_range_deg)
-
-
-def _to_head_frame(orientation: Array, velocity: Array) -> Array:
-    """Angular velocities [deg/s] in the head frame, from the eye's own frame [rad/s]; both (n, time, ...)."""
-    flat = rotation(orientation.reshape(-1, 4)).apply(velocity.reshape(-1, 3))
-    return np.rad2deg(flat).reshape(velocity.shape)

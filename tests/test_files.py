@@ -1,0 +1,419 @@
+"""What is read and written: motor commands, trajectories, surrogates; whole or not at all, and errors that help."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from orient_eye.errors import InputError
+from orient_eye.files import write_atomically, write_text
+from orient_eye.motor_file import read_command, rest_position
+from orient_eye.plants import Plant, make_plant
+from orient_eye.plants.lpf import LowPassPlant
+from orient_eye.plants.mujoco import MujocoPlant
+from orient_eye.rotations import from_yaw
+from orient_eye.surrogate import Surrogate
+from orient_eye.trajectory import Trajectory, concatenate, motor_column
+
+Array = NDArray[np.float64]
+
+
+# --- motor commands -------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def eye() -> Plant:
+    return make_plant("mujoco")
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "command.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_command_is_straight_lines_at_the_plants_step(tmp_path: Path, eye: Plant) -> None:
+    path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.0105,0,11.5,-3\n0.02,5,11.5,0\n")
+    command = read_command(path, eye)
+    assert command.shape == (1, 21, 3)
+    t = 0.001 * np.arange(21)
+    knots = [0, 0.0105, 0.02]
+    expected = [np.interp(t, knots, values) for values in ([0, 0, 5], [1, 11.5, 11.5], [0, -3, 0])]
+    np.testing.assert_allclose(command[0].T, expected, rtol=0, atol=1e-12)
+
+
+@settings(deadline=None, max_examples=40, derandomize=True)
+@given(
+    gaps=st.lists(st.floats(0.0003, 0.05), min_size=1, max_size=8),
+    start=st.floats(-2, 100),
+    seed=st.integers(0, 2**30),
+)
+def test_uneven_sampling(tmp_path_factory: pytest.TempPathFactory, gaps: list[float], start: float, seed: int) -> None:
+    """Any sampling, from any time on: numpy's interpolation of the same rows."""
+    t = start + np.concatenate([[0], np.cumsum(gaps)])
+    tau = np.random.default_rng(seed).uniform(-40, 40, len(t))
+    rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(t.tolist(), tau.tolist(), strict=True))
+    path = write(tmp_path_factory.mktemp("csv"), f"t_s,tau2_deg\n{rows}\n")
+    plant = LowPassPlant()
+    if t[-1] - t[0] < 2e-3:
+        return
+    command = read_command(path, plant)[0, :, 0]
+    assert len(command) == round((t[-1] - t[0]) / 0.001) + 1
+    at = t[0] + 0.001 * np.arange(len(command))
+    np.testing.assert_allclose(command, np.interp(at, t, tau), rtol=0, atol=1e-7)
+
+
+def test_jumps(tmp_path: Path) -> None:
+    """Two rows at one time: the later holds from that time on; the first row is the rest before it."""
+    path = write(tmp_path, "t_s,tau2_deg\n0,5\n0,20\n0.003,20\n0.003,7\n0.003,8\n0.0055,8\n0.0055,-1\n0.008,-1\n")
+    plant = LowPassPlant()
+    np.testing.assert_array_equal(read_command(path, plant)[0, :, 0], [20, 20, 20, 8, 8, 8, -1, -1, -1])
+    np.testing.assert_array_equal(rest_position(path, plant), [[5]])
+
+
+def test_the_last_row_is_held_and_the_horizon_cuts(tmp_path: Path) -> None:
+    path = write(tmp_path, "t_s,tau2_deg\n0,0\n0.004,8\n")
+    plant = LowPassPlant()
+    np.testing.assert_allclose(read_command(path, plant, horizon_s=0.006)[0, :, 0], [0, 2, 4, 6, 8, 8, 8], atol=1e-9)
+    np.testing.assert_allclose(read_command(path, plant, horizon_s=0.002)[0, :, 0], [0, 2, 4], atol=1e-9)
+    one_row = write(tmp_path, "t_s,tau2_deg\n0,12\n")
+    np.testing.assert_array_equal(read_command(one_row, plant, horizon_s=0.003)[0, :, 0], [12] * 4)
+
+
+def test_columns_in_any_order_and_motors_left_out(tmp_path: Path, eye: Plant) -> None:
+    path = write(tmp_path, "tau3_deg, t_s ,tau1_deg\n1,0,4\n2,0.001,5\n")
+    np.testing.assert_array_equal(read_command(path, eye), [[[4, 0, 1], [5, 0, 2]]])
+    np.testing.assert_array_equal(rest_position(path, eye), [[4, 0, 1]])
+
+
+def test_a_motor_the_plant_lacks_may_stand_at_0(tmp_path: Path) -> None:
+    path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.001,0,2,0\n")
+    np.testing.assert_array_equal(read_command(path, LowPassPlant()), [[[1], [2]]])
+    path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.001,0,2,0.5\n")
+    with pytest.raises(InputError, match=r"'lpf' cannot be commanded by tau3_deg; its columns are t_s, tau2_deg"):
+        read_command(path, LowPassPlant())
+
+
+def test_spreadsheets_byte_order_mark_and_blank_lines(tmp_path: Path) -> None:
+    path = tmp_path / "command.csv"
+    path.write_bytes("\ufefft_s,tau2_deg\r\n0,1\r\n\r\n0.001,2\r\n\r\n".encode())
+    np.testing.assert_array_equal(read_command(path, LowPassPlant()), [[[1], [2]]])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"needs a header \(t_s,tau1_deg,tau2_deg,tau3_deg\) and at least one row"),
+        ("t_s,tau2_deg\n", "at least one row of numbers"),
+        ("time,tau2_deg\n0,1\n1,2\n", r"has the columns time, tau2_deg; .*needs t_s \[s\]"),
+        ("t_s,tau2_deg\n0,1\n0.1,abc\n", r"line 3: .*'abc'; every value is a number"),
+        ("t_s,tau2_deg\n0,1\n0.1\n", r"line 3: needs 2 finite numbers, got \['0.1'\]"),
+        ("t_s,tau2_deg\n0,1,9\n0.1,2,9\n", "line 2: needs 2 finite numbers"),
+        ("t_s,tau2_deg\n0,1\n0.1,nan\n", "line 3: needs 2 finite numbers"),
+        ("t_s,tau2_deg\n0,inf\n0.1,2\n", "line 2: needs 2 finite numbers"),
+        ("t_s,tau2_deg\n0,1\n0.2,2\n0.1,2\n", "line 4: t_s goes back; sort the rows by time"),
+        ("t_s,tau2_deg,tau2_deg\n0,1,1\n0.1,2,2\n", "a column stands twice in the header t_s, tau2_deg, tau2_deg"),
+        ("t_s,tau7_deg\n0,1\n0.1,2\n", r"'mujoco' cannot be commanded by tau7_deg; its columns are t_s, tau1"),
+        ("t_s,velocity\n0,0\n0.1,0\n", "cannot be commanded by velocity"),
+        ("t_s\n0\n0.1\n", "commands no motor; add a column, one of tau1_deg, tau2_deg, tau3_deg"),
+        ("t_s,tau7_deg\n0,0\n0.1,0\n", "commands no motor"),
+        ("t_s,tau2_deg\n0,1\n", "lasts between one step and one hour, this one 0 s"),
+        ("t_s,tau2_deg\n0,1\n5000,1\n", "lasts between one step and one hour, this one 5000 s"),
+    ],
+)
+def test_bad_command_files_are_refused(tmp_path: Path, eye: Plant, text: str, message: str) -> None:
+    path = write(tmp_path, text)
+    with pytest.raises(InputError, match=message):
+        read_command(path, eye)
+
+
+def test_every_error_names_the_file(tmp_path: Path, eye: Plant) -> None:
+    for text in ("", "time\n0\n", "t_s,tau2_deg\n0,x\n", "t_s,tau7_deg\n0,1\n1,1\n", "t_s\n0\n1\n"):
+        path = write(tmp_path, text)
+        with pytest.raises(InputError, match=r"command\.csv"):
+            read_command(path, eye)
+
+
+def test_line_numbers_count_blank_lines(tmp_path: Path, eye: Plant) -> None:
+    """The number is the editor's, so that the line is found."""
+    with pytest.raises(InputError, match="line 5"):
+        read_command(write(tmp_path, "t_s,tau2_deg\n\n0,1\n\n0.1,abc\n"), eye)
+    with pytest.raises(InputError, match="line 6: t_s goes back"):
+        read_command(write(tmp_path, "t_s,tau2_deg\n\n0,1\n0.2,1\n\n0.1,1\n"), eye)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path, eye: Plant) -> None:
+    with pytest.raises(InputError, match=r"cannot read .*nowhere\.csv"):
+        read_command(tmp_path / "nowhere.csv", eye)
+    with pytest.raises(InputError, match="cannot read"):
+        read_command(tmp_path, eye)
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"\xff\xfe\x00\x01" * 50)
+    with pytest.raises(InputError, match=r"cannot read .*binary\.csv"):
+        read_command(binary, eye)
+
+
+# --- trajectories ---------------------------------------------------------------------------------
+
+
+def trajectory(saccades: int = 3) -> Trajectory:
+    """MuJoCo's, the last saccade failed."""
+    plant = MujocoPlant(threads=1)
+    command = np.tile(np.linspace(0, 9, 12)[None, :, None], (saccades, 1, 3))
+    if saccades > 1:
+        command[-1, 5, 0] = np.nan
+    return plant.simulate(command)
+
+
+def same(one: Trajectory, other: Trajectory) -> None:
+    for name, value in vars(one).items():
+        found = getattr(other, name)
+        if isinstance(value, np.ndarray):
+            np.testing.assert_array_equal(found, value, err_msg=name)
+            assert found.dtype == value.dtype
+        else:
+            assert found == value
+
+
+@pytest.mark.parametrize("kind", ["tendons", "none"])
+def test_trajectory_npz_round_trip(tmp_path: Path, kind: str) -> None:
+    """Bit for bit, failed saccades included, and nothing that needs pickle."""
+    one = trajectory() if kind == "tendons" else LowPassPlant().simulate(np.ones((2, 5, 1)))
+    path = one.save_npz(tmp_path / "new" / "folder" / "saccades.npz")
+    assert path == tmp_path / "new" / "folder" / "saccades.npz"
+    same(one, Trajectory.load_npz(path))
+    with np.load(path, allow_pickle=False) as file:
+        assert {name: file[name].dtype.kind for name in file.files}
+        assert set(file.files) == set(vars(one)) - ({"tension"} if one.tension is None else set())
+    assert [p.name for p in path.parent.iterdir()] == ["saccades.npz"]
+
+
+def test_npz_under_any_name(tmp_path: Path) -> None:
+    """The file has the name that was asked for, whatever its ending, and lies there alone."""
+    one = trajectory()
+    path = one.save_npz(tmp_path / "saccades")
+    same(one, Trajectory.load_npz(path))
+    assert [p.name for p in tmp_path.iterdir()] == ["saccades"]
+
+
+def test_trajectory_csv_round_trip(tmp_path: Path) -> None:
+    one = trajectory()[0]
+    path = one.to_csv(tmp_path / "trajectory.csv")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert lines[0] == (
+        "t_s,q_w,q_x,q_y,q_z,yaw_deg,pitch_deg,roll_deg,omega_x_deg_s,omega_y_deg_s,omega_z_deg_s,"
+        "tau1_deg,tau2_deg,tau3_deg,tension_motor1_upper_N,tension_motor1_lower_N,tension_motor2_right_N,"
+        "tension_motor2_left_N,tension_motor3_upper_N,tension_motor3_lower_N"
+    )
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    assert len(table) == len(one.time)
+    assert one.tension is not None
+    expected = [one.time, *one.orientation[0].T, one.yaw_deg[0], one.pitch_deg[0], one.roll_deg[0]]
+    expected += [*one.angular_velocity[0].T, *one.motor[0].T, *one.tension[0].T]
+    for name, column in zip(table.dtype.names, expected, strict=True):
+        np.testing.assert_allclose(table[name], column, rtol=1e-8, atol=1e-12, err_msg=name)
+
+
+def test_a_trajectorys_csv_is_a_command(tmp_path: Path) -> None:
+    """Its tau columns can be simulated again: the rest of the columns is taken out first."""
+    one = LowPassPlant().simulate(np.linspace(0, 9, 12)[None, :, None])
+    lines = one.to_csv(tmp_path / "trajectory.csv").read_text(encoding="utf-8").splitlines()
+    keep = [lines[0].split(",").index(name) for name in ("t_s", motor_column("motor2"))]
+    text = "\n".join(",".join(line.split(",")[i] for i in keep) for line in lines)
+    np.testing.assert_allclose(read_command(write(tmp_path, text), LowPassPlant()), one.motor, atol=1e-7)
+
+
+def test_csv_of_a_batch_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"one saccade, this trajectory has 3; pick one: trajectory\[0\]"):
+        trajectory().to_csv(tmp_path / "trajectory.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+def bad_npz(folder: Path) -> dict[str, bytes]:
+    good = trajectory(1).save_npz(folder / "good.npz")
+    other = folder / "other.npz"
+    np.savez(other, a=np.zeros(3))
+    pickled = folder / "pickled.npz"
+    np.savez(pickled, motor_names=np.array([{}], dtype=object))
+    array = folder / "array.npy"
+    np.save(array, np.zeros(3))
+    whole = good.read_bytes()
+    return {
+        "other arrays": other.read_bytes(),
+        "pickle": pickled.read_bytes(),
+        "one array": array.read_bytes(),
+        "half a file": whole[: len(whole) // 2],
+        "nothing": b"",
+        "text": b"t_s,q_w\n0,1\n",
+        "damaged": whole[:200] + bytes(100) + whole[300:],
+    }
+
+
+@pytest.mark.parametrize(
+    "kind", ["other arrays", "pickle", "one array", "half a file", "nothing", "text", "damaged"]
+)  # fmt: skip
+def test_files_that_are_no_trajectory_are_refused(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "bad.npz"
+    path.write_bytes(bad_npz(tmp_path)[kind])
+    with pytest.raises(InputError, match=r"bad\.npz is not a trajectory file \(.npz written by orient-eye\)"):
+        Trajectory.load_npz(path)
+
+
+def test_a_missing_trajectory_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere\.npz is not a trajectory file"):
+        Trajectory.load_npz(tmp_path / "nowhere.npz")
+
+
+def test_picking_and_joining_saccades() -> None:
+    one = trajectory()
+    assert len(one) == 3
+    assert len(one[1]) == 1
+    np.testing.assert_array_equal(one[-1].failed, [True])
+    np.testing.assert_array_equal(one[1:].motor, one.motor[1:])
+    np.testing.assert_array_equal(one[~one.failed].orientation, one.orientation[:2])
+    same(one, concatenate([one[0], one[1:]]))
+    flat = LowPassPlant().simulate(np.ones((2, 12, 1)))
+    same(concatenate([flat[0], flat[1]]), flat)
+    for other in (flat, LowPassPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))):
+        with pytest.raises(InputError, match="same plant and the same times"):
+            concatenate([one, other])
+    with pytest.raises(InputError, match="same plant and the same times"):
+        concatenate([flat, LowPassPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))])
+
+
+# --- atomic writes --------------------------------------------------------------------------------
+
+
+def test_a_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "result.json", "old")
+
+    def fail(temporary: Path) -> None:
+        temporary.write_text("half of the n", encoding="utf-8")
+        raise OSError("no space left")
+
+    with pytest.raises(OSError, match="no space left"):
+        write_atomically(path, fail)
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupted_write_keeps_the_old_file(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "result.json", "old")
+
+    def interrupt(temporary: Path) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(path, interrupt)
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "result.txt", "old")
+
+    def look(temporary: Path) -> None:
+        assert temporary.parent == tmp_path  # the same file system: the last step is one renaming
+        assert temporary.suffix == ".txt"
+        temporary.write_text("new", encoding="utf-8")
+        assert path.read_text(encoding="utf-8") == "old"
+
+    assert write_atomically(path, look) == path
+    assert path.read_text(encoding="utf-8") == "new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_folders_are_made_and_others_may_read(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "a" / "b" / "note.txt", "grüße")
+    assert path.read_bytes() == "grüße".encode()
+    if os.name == "posix":
+        assert path.stat().st_mode & 0o777 == 0o644
+
+
+def test_a_failed_trajectory_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = trajectory(1)
+    path = one.save_npz(tmp_path / "saccades.npz")
+    before = path.read_bytes()
+
+    def fail(file: Path, **arrays: Any) -> None:
+        file.write_bytes(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(np, "savez_compressed", fail)
+    with pytest.raises(OSError, match="disk full"):
+        trajectory(1).save_npz(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+# --- surrogates -----------------------------------------------------------------------------------
+
+
+def test_surrogate_round_trip(tmp_path: Path) -> None:
+    one = Surrogate(-1.23456789012345, 17.499999999999, "motor1", "a rig, Ünit 2", {"amplitudes": [1.0, 2.0], "n": 3})
+    path = one.save(tmp_path / "surrogate.json")
+    assert Surrogate.load(path) == Surrogate.load(str(path)) == one
+    assert json.loads(path.read_text(encoding="utf-8"))["K"] == one.K
+
+
+def test_shipped_surrogate_is_the_thesis() -> None:
+    """Thesis 3.3.1."""
+    shipped = Surrogate.load("thesis")
+    assert (shipped.K, shipped.w0, shipped.motor) == (1.4758, 17.5, "motor2")
+    assert "thesis" in shipped.source
+
+
+GOOD: dict[str, Any] = {"format": "orient-eye surrogate 1", "K": 1.4, "w0": 17.0}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[1, 2]",
+        "3",
+        "null",
+        "{}",
+        json.dumps(GOOD | {"format": "orient-eye surrogate 2"}),
+        json.dumps({k: v for k, v in GOOD.items() if k != "K"}),
+        json.dumps(GOOD | {"zeta": 0.7}),
+        json.dumps(GOOD | {"K": "1.4"}),
+        json.dumps(GOOD | {"w0": None}),
+        "\ud800".encode("utf-8", "surrogatepass").decode("latin-1"),
+    ],
+)
+def test_files_that_are_no_surrogate_are_refused(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "surrogate.json"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=r"surrogate\.json is no surrogate \(.*orient-eye sysid.*shipped.*: thesis"):
+        Surrogate.load(path)
+
+
+@pytest.mark.parametrize("values", [{"K": 0}, {"w0": 0}, {"w0": -17.5}, {"K": float("nan")}, {"w0": float("inf")}])
+def test_impossible_surrogates_are_refused(tmp_path: Path, values: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=r"finite gain K != 0 and w0 > 0, got K = .*, w0 = "):
+        Surrogate(**({"K": 1.4, "w0": 17.5} | values))
+    path = tmp_path / "surrogate.json"
+    path.write_text(json.dumps(GOOD | values), encoding="utf-8")
+    with pytest.raises(InputError, match="finite gain"):
+        Surrogate.load(path)
+
+
+def test_a_missing_surrogate_is_refused(tmp_path: Path) -> None:
+    for name in (tmp_path / "nowhere.json", "thesys", tmp_path):
+        with pytest.raises(InputError, match=r"is no surrogate .*shipped.*: thesis"):
+            Surrogate.load(name)
+
+
+def test_horizontal_orientations_of_the_csv_are_the_yaw(tmp_path: Path) -> None:
+    one = LowPassPlant(Surrogate(1.0, 10.0)).simulate(np.full((1, 3, 1), 25.0))
+    table = np.genfromtxt(one.to_csv(tmp_path / "t.csv"), delimiter=",", names=True)
+    np.testing.assert_allclose(table["yaw_deg"], 25, rtol=1e-8)
+    np.testing.assert_allclose([table["q_w"][0], table["q_z"][0]], from_yaw(25.0)[[0, 3]], rtol=1e-8)
