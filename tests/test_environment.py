@@ -344,6 +344,7 @@ def test_batch_of_chosen_saccades() -> None:
 
 def test_seeds_of_the_batch() -> None:
     """By the constructor or by `seed()` before a reset; the same saccades on every plant."""
+
     def drawn(env: SaccadeVecEnv) -> list[Array]:
         rounds = [np.asarray(env.reset())]
         rounds += [np.asarray(env.step(np.zeros((3, 3), np.float32))[0]) for _ in range(2)]

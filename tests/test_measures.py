@@ -162,8 +162,7 @@ def test_settling_is_continuous_in_the_action(variant: int) -> None:
 def test_mirrored_saccades_measure_alike() -> None:
     command = random_pulse_steps(1, 20)
     one, other = (
-        measure_response(PLANT.respond(PulseStep(s * command.F, command.B, s * command.D, command.k0)))
-        for s in (1, -1)
+        measure_response(PLANT.respond(PulseStep(s * command.F, command.B, s * command.D, command.k0))) for s in (1, -1)
     )
     for name in SCALARS:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))

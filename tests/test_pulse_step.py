@@ -431,9 +431,7 @@ def test_formulas_of_variant_2(saccade: tuple[float, float, float, float], C: fl
         A * C * (-(B - k0) / C * np.exp(-B * t) - (k0 - (B + C)) / C * np.exp(-(B + C) * t)),
     )
     at_0 = (  # 4.37
-        (k0 - B) ** 2 / (-2 * B)
-        + 2 * (k0 - B) * (B + C - k0) / -(2 * B + C)
-        + (B + C - k0) ** 2 / (-2 * (B + C))
+        (k0 - B) ** 2 / (-2 * B) + 2 * (k0 - B) * (B + C - k0) / -(2 * B + C) + (B + C - k0) ** 2 / (-2 * (B + C))
     )
     assert plain.command().energy()[0] == pytest.approx(A**2 * -at_0, rel=1e-9)
 

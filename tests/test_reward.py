@@ -229,7 +229,7 @@ TABLE_COST = np.array([28940, 40227, 57314, 70546, 87028, 101192])
 @functools.cache
 def table_optimum() -> Optimum:
     start, _, target = chosen(AMPLITUDE, TABLE_B, TABLE_KD, TABLE_K0)
-    return find_optimum(TASK, start, target, np.random.default_rng(0), generations=150)
+    return find_optimum(TASK, start, target, np.random.default_rng(0), generations=100)
 
 
 def test_actions_of_the_table_cost_what_it_says() -> None:
@@ -246,6 +246,13 @@ def test_the_search_finds_the_table() -> None:
     np.testing.assert_allclose(B, TABLE_B, atol=0.25)
     np.testing.assert_allclose(K * D + AMPLITUDE / 2, TABLE_KD, atol=0.01)
     np.testing.assert_allclose(k0, TABLE_K0, atol=0.012)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_default_search_reaches_the_table_from_any_seed(seed: int) -> None:
+    start, _, target = chosen(AMPLITUDE, TABLE_B, TABLE_KD, TABLE_K0)
+    found = find_optimum(TASK, start, target, np.random.default_rng(seed))
+    np.testing.assert_allclose(-found.reward, TABLE_COST, rtol=1e-4)
 
 
 def test_the_found_reward_is_that_of_the_found_action() -> None:
@@ -286,28 +293,27 @@ def random_pairs(count: int, task: SaccadeTask = TASK) -> tuple[Fixation, Array]
     return task.fixate(horizontal(start)), horizontal(target)
 
 
-def test_a_longer_search_finds_no_better() -> None:
-    """60 random pairs, other seed, twice the work."""
+def test_another_search_finds_no_better() -> None:
+    """60 random pairs, other seed, fewer candidates for longer."""
     start, target = random_pairs(60)
-    short = find_optimum(TASK, start, target, np.random.default_rng(1))
-    long = find_optimum(TASK, start, target, np.random.default_rng(2), generations=100)
-    gap = (long.reward - short.reward) / np.abs(long.reward)
+    found = find_optimum(TASK, start, target, np.random.default_rng(1))
+    other = find_optimum(TASK, start, target, np.random.default_rng(2), population=24, generations=75)
+    gap = (other.reward - found.reward) / np.abs(other.reward)
     assert gap.max() < 0.005
-    assert short.evaluations == 60 * 36 * 51
     low, high = TASK.action_low, TASK.action_high
-    assert ((short.action >= low) & (short.action <= high)).all()
+    assert ((found.action >= low) & (found.action <= high)).all()
 
 
 def test_no_random_action_is_better() -> None:
-    """50 000 actions, half of them landing near the target."""
+    """30 000 actions, half of them landing near the target."""
     start, target = random_pairs(5)
     best = find_optimum(TASK, start, target, np.random.default_rng(1)).reward
     rng = np.random.default_rng(3)
     for i in range(5):
-        rows = np.full(10_000, i)
-        action = rng.uniform([18, -80, 5], [80, 80, 40], (10_000, 3))
-        action[::2, 1] = rng.normal(TASK.lands_on(target[[i]])[0, 0], 0.3, 5000)
-        action[::2, 2] = rng.normal(17.5, 0.3, 5000)
+        rows = np.full(6000, i)
+        action = rng.uniform([18, -80, 5], [80, 80, 40], (6000, 3))
+        action[::2, 1] = rng.normal(TASK.lands_on(target[[i]])[0, 0], 0.3, 3000)
+        action[::2, 2] = rng.normal(17.5, 0.3, 3000)
         assert TASK.perform(start[rows], action[:, None], target[rows]).reward.total.max() < best[i]
 
 
@@ -324,9 +330,9 @@ def test_same_generator_same_optimum() -> None:
 
 def test_the_search_on_mujoco() -> None:
     """One search on the simulator: near the low-pass optimum, and better than its action."""
-    task = SaccadeTask(MujocoPlant())
+    task = SaccadeTask(MujocoPlant(), horizon_s=0.3)
     start, target = task.fixate(horizontal([-10.0])), horizontal([10.0])
-    found = find_optimum(task, start, target, np.random.default_rng(0))
+    found = find_optimum(task, start, target, np.random.default_rng(0), population=30, generations=30)
     B, D, k0 = found.action[0, 0]
     of_low_pass = np.array([[[43.67, float(task.lands_on(target)[0, 0]), 17.5]]])
     assert found.reward[0] > task.perform(start, of_low_pass, target).reward.total[0]
@@ -338,8 +344,10 @@ def test_the_search_on_mujoco() -> None:
 def test_search_options() -> None:
     start, target = random_pairs(1)
     shares: list[float] = []
-    find_optimum(TASK, start, target, np.random.default_rng(0), population=12, generations=4, progress=shares.append)
+    options = {"population": 12, "generations": 4}
+    found = find_optimum(TASK, start, target, np.random.default_rng(0), progress=shares.append, **options)
     assert shares == [0.25, 0.5, 0.75, 1.0]
+    assert found.evaluations == 12 * (1 + 4)
     for population in (37, 9, 0):
         with pytest.raises(InputError, match=f"multiple of 3 and at least 12, got {population}"):
             find_optimum(TASK, start, target, np.random.default_rng(0), population=population)

@@ -99,6 +99,7 @@ def rigid_body(motor2: float, t: Array) -> Array:
 
     Written out from thesis 3.2 to 3.9 and the constants of the author's program.
     """
+
     def turn(angle: float) -> Array:
         return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
 

@@ -25,6 +25,8 @@ class Train:
     """Run directory to go on with; takes the run's own configuration."""
     quiet: bool = False
     """No progress bar."""
+    checkpoint_every: float = 20.0
+    """Seconds between checkpoints, from which --resume goes on after a crash."""
 
     def run(self) -> dict[str, Any]:
         """Train or resume."""
@@ -37,13 +39,13 @@ class Train:
 
         try:
             if self.resume:
-                result = resume(self.resume, quiet=self.quiet)
+                result = resume(self.resume, quiet=self.quiet, checkpoint_s=self.checkpoint_every)
             else:
-                result = train(self.config, self.out, quiet=self.quiet)
+                result = train(self.config, self.out, quiet=self.quiet, checkpoint_s=self.checkpoint_every)
         except Interrupted as stopped:
             say(str(stopped))
             raise SystemExit(130) from None
-        say(_table(result))
+        say(learned_table(result))
         say(
             f"mean reward gap to the searched optimum over {result['pairs']} random saccades: "
             f"{100 * result['gap_mean']:.2f} % (95th percentile {100 * result['gap_p95']:.2f} %)"
@@ -55,7 +57,8 @@ class Train:
         return result
 
 
-def _table(result: dict[str, Any]) -> Any:
+def learned_table(result: dict[str, Any]) -> Any:
+    """Learned actions beside the best ones found, for people; result has `plant` and `table`."""
     from rich.table import Table
 
     table = Table(title=f"learned | best action found, plant {result['plant']}")

@@ -64,7 +64,7 @@ def draw_policy(task: SaccadeTask, policy: Policy, yardstick: Yardstick, path: P
     _draw_output(axes[0], policy, yardstick, ("B", "D - F", "k0"))
     shown = _Saccades.symmetric(task, policy, _SHOWN_DEG)
     _draw_yaw(axes[1, 0], shown)
-    _draw_speed(axes[1, 1], shown)
+    _draw_speed(axes[1, 1], shown, legend=True)
     _draw_main_sequence(axes[1, 2], task, policy)
     return save(figure, path)
 
@@ -103,6 +103,7 @@ def figure_5_2(policy: Policy, task: SaccadeTask) -> Figure:
         pulse.legend(frameon=False)
     _draw_yaw(yaw, shown)
     yaw.set_title("trajectory")
+    yaw.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5), reverse=True)
     _tidy(pulse, motor)
     return _titled(figure, "Saccades of the policy", policy, task)
 
@@ -270,12 +271,13 @@ def _draw_output(
     every = _Saccades.every_size(task, policy)
     size = np.abs(yardstick.target_yaw_deg - yardstick.start_yaw_deg)
     best = task.pulse_step(yardstick.start, yardstick.optimum.action)
+    shown = size >= _SIZES_DEG[0]  # where there is nothing to do, B, k0 and C may be anything
     for axes, symbol in zip(panels, symbols, strict=True):
         theirs, ours = (_output(command, symbol)[:, motor] for command in (best, every.command))
-        axes.plot(size, theirs, ".", color=_BEST, ms=6, label="searched optimum")
+        axes.plot(size[shown], theirs[shown], ".", color=_BEST, ms=6, label="searched optimum")
         _mean_and_range(axes, np.abs(every.size_deg), ours, _LEARNED, "policy, mean over starting points")
         axes.set(xlabel="saccade size [deg]", ylabel=_UNITS[symbol], xlim=(0, 70))
-        if symbol == "C" and theirs.max() > 30 * max(theirs.min(), 1e-9):
+        if symbol == "C" and ours.max() > 30 * ours.min():
             axes.set_yscale("log")
         low, high = axes.get_ylim()
         more = max(_LEAST_SPAN.get(symbol, 0) - (high - low), 0) / 2  # no drama in the second decimal
@@ -306,7 +308,6 @@ def _draw_yaw(axes: "Axes", shown: _Saccades) -> None:
     for yaw, size, colour in zip(trajectory.yaw_deg, shown.size_deg, _colours(len(trajectory)), strict=True):
         axes.plot(1e3 * trajectory.time, yaw + size / 2, color=colour, label=f"{size:g} deg")
     axes.set(xlabel="time [ms]", ylabel="yaw from the start [deg]", xlim=(0, 300))
-    axes.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5), reverse=True)
     _tidy(axes)
 
 
@@ -366,10 +367,12 @@ def _draw_human(peak: "Axes", duration: "Axes", skewness: "Axes") -> None:
 
 def _study(row: dict[str, str]) -> str:
     """Short name of the study a row of the human data is from."""
-    for name in ("Collewijn et al. 1988", "Andersson et al. 2017", "100 adults, PMC6143243"):
-        if name.split()[-1] in row["source"]:
-            return name
-    return row["source"]
+    names = {
+        "Collewijn": "Collewijn et al. 1988",
+        "Andersson": "Andersson et al. 2017",
+        "PMC": "100 adults, PMC6143243",
+    }
+    return next((name for part, name in names.items() if part in row["source"]), row["source"])
 
 
 def _titled(figure: Figure, title: str, policy: Policy, task: SaccadeTask) -> Figure:

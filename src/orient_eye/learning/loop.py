@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 STAGES = (0.0, 0.1, 0.25, 0.5, 1.0)
 """Shares of the training at which evaluation saccades are recorded."""
 _EVALUATIONS = 50  # a run
-_CHECKPOINT_S = 20.0
+CHECKPOINT_S = 20.0
+"""Seconds between checkpoints."""
 
 
 class Stop(Exception):
@@ -48,8 +49,10 @@ class TrainingLoop(BaseCallback):
         table: Yardstick,
         bar: Progress,
         ctrl_c: "CtrlC",
+        checkpoint_s: float,
     ) -> None:
         super().__init__()
+        self.checkpoint_s = checkpoint_s
         self.folder, self.env, self.yardstick, self.table, self.ctrl_c = folder, env, yardstick, table, ctrl_c
         self.updates = updates
         self.every = max(1, self.updates // _EVALUATIONS)
@@ -96,7 +99,7 @@ class TrainingLoop(BaseCallback):
         if self.ctrl_c.pressed:
             self._save()
             raise Stop
-        if time.monotonic() - self.saved > _CHECKPOINT_S:
+        if time.monotonic() - self.saved > self.checkpoint_s:
             self._save()
 
     def finish(self) -> None:

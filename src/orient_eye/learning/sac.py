@@ -164,4 +164,4 @@ class OneStepSAC(SAC):
         return temperature
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "temperature", "_policy", "_q"]
+        return [*super()._excluded_save_params(), "_policy", "_q"]

@@ -22,7 +22,7 @@ from orient_eye.errors import InputError
 from orient_eye.learning.checkpoint import load_checkpoint
 from orient_eye.learning.config import TrainConfig
 from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluation_saccades
-from orient_eye.learning.loop import CtrlC, Stop, TrainingLoop, progress_bar
+from orient_eye.learning.loop import CHECKPOINT_S, CtrlC, Stop, TrainingLoop, progress_bar
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
@@ -44,13 +44,16 @@ class Interrupted(Exception):
         super().__init__(f"stopped; go on with: orient-eye train --resume {folder}")
 
 
-def train(config: TrainConfig, out: Path | None = None, *, quiet: bool = False) -> dict[str, Any]:
+def train(
+    config: TrainConfig, out: Path | None = None, *, quiet: bool = False, checkpoint_s: float = CHECKPOINT_S
+) -> dict[str, Any]:
     """Run a new training.
 
     Args:
         config: of the run.
         out: its directory, new or empty; None for runs/train-DATE-TIME.
         quiet: no progress bar.
+        checkpoint_s: seconds between checkpoints.
 
     Returns:
         The content of result.json.
@@ -65,10 +68,10 @@ def train(config: TrainConfig, out: Path | None = None, *, quiet: bool = False) 
     run = RunDirectory.create(out, "train", config, seed=config.seed)
     if config.plant == "lpf":
         Surrogate.load(config.surrogate).save(run.path / "surrogate.json")
-    return _Run(config, run, plant).execute(resume=False, quiet=quiet)
+    return _Run(config, run, plant, checkpoint_s).execute(resume=False, quiet=quiet)
 
 
-def resume(folder: Path, *, quiet: bool = False) -> dict[str, Any]:
+def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOINT_S) -> dict[str, Any]:
     """Go on with a run that was stopped, to the numbers it would have had.
 
     Raises:
@@ -84,9 +87,8 @@ def resume(folder: Path, *, quiet: bool = False) -> dict[str, Any]:
     if (folder / "result.json").exists():
         raise InputError(f"{folder} is finished: its result is in result.json; start a new run without --resume")
     surrogate = folder / "surrogate.json"
-    return _Run(config, run, _plant(config, surrogate if surrogate.exists() else None)).execute(
-        resume=True, quiet=quiet
-    )
+    plant = _plant(config, surrogate if surrogate.exists() else None)
+    return _Run(config, run, plant, checkpoint_s).execute(resume=True, quiet=quiet)
 
 
 def _plant(config: TrainConfig, surrogate: Path | None = None) -> Plant:
@@ -107,6 +109,7 @@ class _Run:
     config: TrainConfig
     run: RunDirectory
     plant: Plant
+    checkpoint_s: float
     task: SaccadeTask = field(init=False)
 
     def __post_init__(self) -> None:
@@ -129,7 +132,7 @@ class _Run:
         model = self._model(env, seed=config.seed, buffer_seed=buffer)
         with progress_bar(quiet) as bar, CtrlC() as ctrl_c:
             yardstick, table = self._yardsticks(bar)
-            loop = TrainingLoop(folder, env, config.updates, yardstick, table, bar, ctrl_c)
+            loop = TrainingLoop(folder, env, config.updates, yardstick, table, bar, ctrl_c, self.checkpoint_s)
             if resume:
                 extra = load_checkpoint(folder, model, env)
                 loop.go_on(extra)

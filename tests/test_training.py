@@ -1,0 +1,161 @@
+"""Training runs: what they leave, that they can be stopped, killed and resumed to the same numbers."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orient_eye.errors import InputError
+from orient_eye.learning.config import TrainConfig
+from orient_eye.learning.policy import Policy
+from orient_eye.learning.training import resume, train
+from orient_eye.plants import make_plant
+from orient_eye.saccade import SaccadeTask, horizontal
+
+TINY = TrainConfig(updates=60, saccades_per_update=16, warmup=64, batch_size=64, evaluation_pairs=4)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _private_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "tiny"
+    train(TINY, folder, quiet=True)
+    return folder
+
+
+def _numbers(folder: Path) -> dict[str, np.ndarray]:
+    with np.load(folder / "policy.npz") as file:
+        return dict(file)
+
+
+def _metrics(folder: Path) -> list[str]:
+    """Rows of metrics.csv without the wall clock."""
+    rows = [line.split(",") for line in (folder / "metrics.csv").read_text().splitlines()]
+    clock = rows[0].index("elapsed_s")
+    return [",".join(row[:clock] + row[clock + 1 :]) for row in rows]
+
+
+def test_a_run_explains_itself(tiny: Path) -> None:
+    description = json.loads((tiny / "run.json").read_text())
+    assert description["config"]["updates"] == 60
+    assert description["seed"] == 0
+    assert "mujoco" in description["versions"]
+    result = json.loads((tiny / "result.json").read_text())
+    assert [row["amplitude_deg"] for row in result["table"]] == [5, 10, 20, 30, 45, 60]
+    assert 0 <= result["gap_mean"] < 100
+    for name in (
+        "policy.npz",
+        "policy.json",
+        "metrics.csv",
+        "learning.png",
+        "policy.png",
+        "recording.rrd",
+        "surrogate.json",
+    ):
+        assert (tiny / name).stat().st_size > 0
+    assert len(list((tiny / "stages").glob("*.npz"))) == 5
+
+
+def test_policy_file_acts_as_the_trained_network(tiny: Path) -> None:
+    policy = Policy.load(tiny)
+    table = json.loads((tiny / "result.json").read_text())["table"]
+    half = np.array([row["amplitude_deg"] for row in table]) / 2
+    action = policy.act(horizontal(-half), horizontal(half))
+    np.testing.assert_allclose(action[:, 0, 0], [row["B"] for row in table])
+
+
+def test_same_seed_same_numbers_other_seed_others(tiny: Path, tmp_path: Path) -> None:
+    train(TINY, tmp_path / "again", quiet=True)
+    for name, array in _numbers(tiny).items():
+        np.testing.assert_array_equal(_numbers(tmp_path / "again")[name], array)
+    assert _metrics(tmp_path / "again") == _metrics(tiny)
+    train(TrainConfig(**{**TINY.__dict__, "seed": 1}), tmp_path / "other", quiet=True)
+    assert not np.array_equal(_numbers(tmp_path / "other")["weight0"], _numbers(tiny)["weight0"])
+
+
+def _command(folder: Path, *options: str) -> list[str]:
+    return [sys.executable, "-m", "orient_eye", "train", "--quiet", "--out", str(folder), *options]
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_killed_and_resumed_is_the_run_never_stopped(how: signal.Signals, tmp_path: Path) -> None:
+    options = ["--updates", "400", "--saccades-per-update", "16", "--batch-size", "64", "--evaluation-pairs", "4"]
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    process = subprocess.Popen(_command(stopped, *options, "--checkpoint-every", "0.2"), stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while not (stopped / "checkpoint.pt").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    time.sleep(0.3)
+    process.send_signal(how)
+    code = process.wait(60)
+    assert code == (-9 if how == signal.SIGKILL else 130)
+    assert not (stopped / "result.json").exists()
+    resume(stopped, quiet=True)
+    subprocess.run(_command(whole, *options), check=True, stderr=subprocess.DEVNULL)
+    for name, array in _numbers(whole).items():
+        np.testing.assert_array_equal(_numbers(stopped)[name], array)
+    assert _metrics(stopped) == _metrics(whole)
+
+
+def test_half_a_checkpoint_is_not_taken_for_a_whole_one(tiny: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for name in ("run.json", "surrogate.json"):
+        (folder / name).write_bytes((tiny / name).read_bytes())
+    with pytest.raises(InputError, match="no checkpoint"):
+        resume(folder, quiet=True)
+    whole = (tiny / "checkpoint.pt").read_bytes()
+    (folder / "checkpoint.pt").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="does not fit"):
+        resume(folder, quiet=True)
+
+
+def test_refusals_leave_nothing_behind(tiny: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="not an empty folder"):
+        train(TINY, tiny, quiet=True)
+    with pytest.raises(InputError, match="finished"):
+        resume(tiny, quiet=True)
+    with pytest.raises(InputError, match="no run directory"):
+        resume(tmp_path, quiet=True)
+    for wrong in (
+        {"updates": 0},
+        {"learning_rate": -1.0},
+        {"temperature": (0.0, 1.0)},
+        {"seed": -1},
+        {"surrogate": "nosuch"},
+    ):
+        with pytest.raises(InputError):
+            train(TrainConfig(**{**TINY.__dict__, **wrong}), tmp_path / "bad", quiet=True)
+    assert not (tmp_path / "bad").exists()
+
+
+def test_trains_on_the_whole_eye(tmp_path: Path) -> None:
+    config = TrainConfig(plant="mujoco", updates=3, saccades_per_update=4, warmup=8, batch_size=16, evaluation_pairs=1)
+    # The search on this plant takes minutes: a short one stands in for it here.
+    from orient_eye.learning import evaluation
+    from orient_eye.optimum import find_optimum
+
+    def short(task: SaccadeTask, start: np.ndarray, target: np.ndarray, **_: object) -> object:
+        random = np.random.default_rng(0)
+        return find_optimum(
+            task, task.fixate(horizontal(start)), horizontal(target), random, population=12, generations=2
+        )
+
+    original, evaluation.searched_optimum = evaluation.searched_optimum, short  # type: ignore[assignment]
+    try:
+        result = train(config, tmp_path / "run", quiet=True)
+    finally:
+        evaluation.searched_optimum = original
+    assert result["plant"] == "mujoco"
+    manifest = json.loads((tmp_path / "run" / "policy.json").read_text())
+    assert manifest["task"]["plant"] == make_plant("mujoco").identity()
