@@ -31,7 +31,7 @@ K = 1.4758  # thesis 3.3.1
 
 def options_of(plant: str) -> dict[str, Any]:
     """The simulators as short as they may be: half a second is the default."""
-    return {"horizon_s": 0.3} if plant == "tavares" else {}
+    return {"horizon_s": 0.25} if plant == "tavares" else {}
 
 
 @pytest.fixture

@@ -133,7 +133,7 @@ def test_settling_jumps_where_the_overshoot_leaves_the_band(B: float, excess: fl
     k0 = brentq(lambda k: overshoot_of(k, B) - BAND - excess, 8, 17.49, xtol=1e-13)
     response = PLANT.respond(pulse_step(B, 20.0, k0))
     settling = measure_response(response).settling_time_s[0]
-    t = np.linspace(0, 1.5, 100_001)
+    t = np.linspace(0, 1, 20_001)
     x = response.motion(t[None])[0][0]
     crest = t[x.argmax()]
     assert x.max() - 1 - BAND == pytest.approx(excess, rel=1e-2, abs=1e-9)
@@ -183,11 +183,11 @@ def test_closed_form_of_no_movement() -> None:
 @pytest.mark.parametrize("variant", PULSES)
 def test_sampled_form_agrees_with_the_closed_form(variant: int) -> None:
     """At 1 ms: what interpolation leaves is of second order in the sampling."""
-    command = random_pulse_steps(variant, 60, seed=3, varying=False)  # a varying C can peak within 1 ms
+    command = random_pulse_steps(variant, 40, seed=3, varying=False)  # a varying C can peak within 1 ms
     closed = measure_response(PLANT.respond(command))
     # Where the overshoot ends within a sample's curvature of the band, the two may see different exits.
     clear = np.abs(closed.overshoot - BAND) > 1e-5
-    assert clear.sum() > 50
+    assert clear.sum() > 35
     for samples, step_s, shrink in ((1201, 0.001, 1.0), (12001, 0.0001, 0.012)):
         plant = LowPassPlant(Surrogate(K, W0), step_s=step_s)
         sampled = measure(plant.trajectory(command, samples), from_yaw(K * command.D[:, 0]))

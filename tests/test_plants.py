@@ -210,7 +210,7 @@ def test_inputs_are_left_alone(plant: Plant) -> None:
 
 def test_batch_is_its_single_saccades(plant: Plant) -> None:
     """Bit for bit from a given start; the equilibrium before it to rounding."""
-    command = saccades(plant)
+    command = saccades(plant, samples=81)
     batch = plant.simulate(command)
     started = plant.simulate(command, EyeState(batch.orientation[:, 0]))
     for i in range(len(command)):
@@ -261,7 +261,7 @@ def test_a_start_that_is_none_fails_alone(plant: Plant) -> None:
 @pytest.mark.parametrize("speed", [1e6, 1e9, 1e14])
 def test_divergence_fails_alone(plant: Plant, speed: float) -> None:
     """An absurd start velocity [deg/s], after which a saccade is either whole or failed, and NaN."""
-    command = saccades(plant)
+    command = saccades(plant, samples=51)
     start, velocity = plant.rest_orientation(command[:, 0]), np.zeros((5, 3))
     velocity[3] = speed * np.array([0.3, -0.5, 0.8])
     found = plant.simulate(command, EyeState(start, velocity))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from orient_eye.cli.predict import PlantChoice
+from orient_eye.cli.predict import AnotherPlant
 
 if TYPE_CHECKING:
     from orient_eye.learning.evaluation import Yardstick
@@ -28,13 +28,13 @@ class Evaluate:
     $ orient-eye evaluate runs/my-run --plant mujoco --force
     """
 
-    policy: Annotated[str, tyro.conf.Positional]
+    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
     """Run directory, policy folder, or name of a shipped policy."""
     pairs: Annotated[int | None, tyro.conf.arg(help_behavior_hint="(default: 300 on lpf, 60 on other plants)")] = None
     """Random saccades, always the same, as in training runs."""
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: runs/evaluate-DATE-TIME)")] = None
     """Run directory, new or empty."""
-    on: PlantChoice = field(default_factory=PlantChoice)
+    another_plant: AnotherPlant = field(default_factory=AnotherPlant)
     quiet: bool = False
     """No progress bar."""
 
@@ -50,14 +50,20 @@ class Evaluate:
         from orient_eye.run_directory import RunDirectory
 
         policy = Policy.load(self.policy)
-        task, differences = self.on.task(policy)
+        task, differences = self.another_plant.task(policy)
         count = (300 if isinstance(task.plant, LowPassPlant) else 60) if self.pairs is None else self.pairs
         if count < 1:
             raise InputError(f"--pairs must be at least 1, got {count}")
         run = RunDirectory.create(self.out, "evaluate", {**asdict(self), "pairs": count})
         pairs, table = self._search(task, count)
-        result = {"out": str(run.path), "policy": self.policy, "plant": task.plant.name, "task": task.identity()}
-        result |= {"differs_from_training": differences, **_measure(policy, pairs, table, run.path / "pairs.csv")}
+        result = {
+            "out": str(run.path),
+            "policy": self.policy,
+            "plant": task.plant.name,
+            "task": task.identity(),
+            "differs_from_training": differences,
+            **_measure(policy, pairs, table, run.path / "pairs.csv"),
+        }
         _draw(policy, pairs, table, run.path)
         _record(policy, table, run.path / "recording.rrd")
         run.write_json("result.json", result)
@@ -66,9 +72,8 @@ class Evaluate:
             f"mean reward gap to the searched optimum over {count} random saccades: "
             f"{100 * result['gap_mean']:.2f} % (95th percentile {100 * result['gap_p95']:.2f} %)"
         )
-        say(
-            f"final yaw off by {result['yaw_error_mean_deg']:.3f} deg in the mean, {result['yaw_error_max_deg']:.3f} deg"
-        )
+        mean, most = (result[f"yaw_error_{name}_deg"] for name in ("mean", "max"))
+        say(f"final yaw off by {mean:.3f} deg in the mean, {most:.3f} deg at most")
         say(f"in {run.path}: result.json, pairs.csv, figure_5_*.png, recording.rrd")
         say(f"look at the saccades: orient-eye view {run.path}/recording.rrd")
         return result
@@ -97,10 +102,9 @@ def _measure(policy: "Policy", pairs: "Yardstick", table: "Yardstick", path: Pat
     rows = saccade_rows(pairs.task, pairs.start_yaw_deg, pairs.target_yaw_deg, outcome)
     best = pairs.task.perform(pairs.start, pairs.optimum.action, pairs.target)
     best_rows = saccade_rows(pairs.task, pairs.start_yaw_deg, pairs.target_yaw_deg, best)
-    for row, other, value in zip(rows, best_rows, gap, strict=True):
-        same = ("start_yaw_deg", "target_yaw_deg", "F")
-        row |= {"gap": float(value)} | {f"{k}_best": v for k, v in other.items() if not k.startswith(same)}
-    write_csv(path, rows)
+    same = ("start_yaw_deg", "target_yaw_deg", "F")
+    beside = [{f"{k}_best": v for k, v in row.items() if not k.startswith(same)} for row in best_rows]
+    write_csv(path, [{**row, "gap": float(g), **other} for row, g, other in zip(rows, gap, beside, strict=True)])
     large = np.abs(pairs.target_yaw_deg - pairs.start_yaw_deg) > 5
     off = np.abs(action - pairs.optimum.action)[large]
     yaw_error = np.abs(to_euler(outcome.measures.final)[0] - pairs.target_yaw_deg)
@@ -127,7 +131,7 @@ def _draw(policy: "Policy", pairs: "Yardstick", table: "Yardstick", folder: Path
 
     task = pairs.task
     pictures = {
-        "figure_5_1": figures.figure_5_1(policy, pairs),
+        "figure_5_1": figures.figure_5_1(policy, pairs, table),
         "figure_5_2": figures.figure_5_2(policy, task),
         "figure_5_3": figures.figure_5_3(policy, task),
         "figure_5_4": figures.figure_5_4(policy, task),

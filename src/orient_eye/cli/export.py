@@ -24,7 +24,7 @@ class Export:
     $ orient-eye export runs/my-run --sb3 policy.zip
     """
 
-    policy: Annotated[str, tyro.conf.Positional]
+    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
     """Run directory, policy folder, or name of a shipped policy."""
     onnx: Annotated[Path | None, _OPTIONAL] = None
     """ONNX file to write; needs pip install "orient-eye[onnx]"."""

@@ -30,7 +30,7 @@ class Models:
         for row in policies:
             table.add_row(*(_text(row, key) for key in ("name", "case", "plant_in_words", "updates")), *_gaps(row))
         say(table if policies else "no policies are shipped; orient-eye train makes one")
-        table = Table("surrogate", "K", "w0 [rad/s]", "motor", "source", title="surrogates")
+        table = Table("surrogate", "K", r"w0 \[rad/s]", "motor", "source", title="surrogates")
         for row in surrogates:
             table.add_row(*(_text(row, key) for key in ("name", "K", "w0", "motor", "source")))
         say(table)

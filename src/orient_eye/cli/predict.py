@@ -22,17 +22,17 @@ _MOTOR_COLUMNS = ("tau1_deg", "tau2_deg", "tau3_deg")  # what `orient-eye simula
 
 
 @dataclass(frozen=True)
-class PlantChoice:
-    """On which plant a policy is used: its own, or with --force another."""
+class AnotherPlant:
+    """To use the policy on another plant than its own."""
 
     plant: Annotated[Literal["lpf", "mujoco", "tavares"] | None, _OWN] = None
-    """Use the policy on this plant; one it was not trained on is refused without --force."""
+    """The plant; one the policy was not trained on is refused without --force."""
     surrogate: Annotated[str | None, tyro.conf.arg(help_behavior_hint="(default: thesis)")] = None
     """For --plant lpf: a surrogate.json written by sysid, or the name of a shipped one."""
     eye: Annotated[str | None, tyro.conf.arg(help_behavior_hint="(default: thesis)")] = None
     """For --plant mujoco and tavares: preset of the eye."""
     force: bool = False
-    """Use the policy also where its plant, pulse or reward are not those it was trained on."""
+    """Use the policy although the plant is not the one it was trained on."""
 
     def task(self, policy: "Policy") -> "tuple[SaccadeTask, list[str]]":
         """The task on that plant, and in words what differs from the one the policy was trained on.
@@ -72,7 +72,7 @@ class Predict:
     $ orient-eye predict runs/my-run --pairs pairs.csv --out predicted.csv
     """
 
-    policy: Annotated[str, tyro.conf.Positional]
+    policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
     """Run directory, policy folder, or name of a shipped policy."""
     start: Annotated[float | None, tyro.conf.arg(help_behavior_hint="(default: 0)")] = None
     """Yaw at which the saccade begins, deg, positive to the left."""
@@ -84,7 +84,7 @@ class Predict:
     """CSV file to write: the motor command of the one saccade, as `orient-eye simulate --motor` reads it."""
     out: Annotated[Path | None, _OPTIONAL] = None
     """CSV file to write: the result, one row a saccade."""
-    on: PlantChoice = field(default_factory=PlantChoice)
+    another_plant: AnotherPlant = field(default_factory=AnotherPlant)
 
     def run(self) -> dict[str, Any]:
         """Predict, write the files and print the table."""
@@ -97,7 +97,7 @@ class Predict:
         if self.command and len(start_yaw) != 1:
             raise InputError(f"--command writes the motor command of one saccade, {self.pairs} has {len(start_yaw)}")
         policy = Policy.load(self.policy)
-        task, differences = self.on.task(policy)
+        task, differences = self.another_plant.task(policy)
         start, target = task.fixate(horizontal(start_yaw)), horizontal(target_yaw)
         action = policy.act(start.orientation, target)
         outcome = task.perform(start, action, target)
@@ -215,6 +215,7 @@ def _write_command(path: Path, trajectory: Any) -> None:
 
 
 def _table(rows: list[dict[str, Any]], task: "SaccadeTask") -> "Table":
+    from rich.markup import escape
     from rich.table import Table
 
     from orient_eye.learning.policy import plant_in_words
@@ -224,7 +225,7 @@ def _table(rows: list[dict[str, Any]], task: "SaccadeTask") -> "Table":
     table = Table(title=f"expected on plant {plant_in_words(task.plant.identity())}")
     heads = [f"{key.replace('_deg', '')} [{units[key.split('_')[0]]}]" for key in keys]
     for name in ("saccade [deg]", *heads, "ends at", "off by", "duration", "peak velocity", "goes beyond", "reward"):
-        table.add_column(name, justify="right")
+        table.add_column(escape(name), justify="right")
     for row in rows:
         saccade = f"{row['start_yaw_deg']:g} to {row['target_yaw_deg']:g}"
         command = (f"{row[key]:.4g}" if key.startswith("C") else f"{row[key]:.3f}" for key in keys)

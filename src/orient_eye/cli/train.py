@@ -62,7 +62,7 @@ def learned_table(result: dict[str, Any]) -> Any:
     from rich.table import Table
 
     table = Table(title=f"learned | best action found, plant {result['plant']}")
-    for name in ("amplitude", "B [1/s]", "D - F [deg]", "k0 [1/s]", "reward", "gap", "duration", "peak velocity"):
+    for name in ("amplitude", "B [1/s]", r"D - F \[deg]", "k0 [1/s]", "reward", "gap", "duration", "peak velocity"):
         table.add_column(name, justify="right")
     for row in result["table"]:
         table.add_row(

@@ -66,8 +66,8 @@ class WeightsCommand:
         plant = chosen_plant(self.plant, self.surrogate, self.eye)
         names = list(CASES) if self.case == "all" else [self.case]
         rows = [self._solve(plant, name, chosen, steps) for name in names]
-        title = f"{self.start:g} to {self.target:g} deg with B = {self.B:g} 1/s, plant {plant.name}, band {self.band:g}"
-        table = Table("case", title=f"Weights that make the saccade optimal (lambda_e = 1): {title}")
+        saccade = f"{self.start:g} to {self.target:g} deg with B = {self.B:g} 1/s"
+        table = Table("case", title=f"{saccade}, plant {plant.name}, band {self.band:g}; lambda_e = 1")
         for name in ("lambda_a", "lambda_d", "lambda_o", "D [deg]", "k0 [1/s]"):
             table.add_column(name, justify="right")
         for row in rows:

@@ -44,7 +44,7 @@ class TrainConfig:
     """Saccades with random actions before the first update."""
     learning_rate: float = 1e-3
     """Of Adam; it falls linearly to 3 % of this over the last fifth of the run."""
-    temperature: tuple[float, float] = (1.0, 3e-3)
+    temperature: tuple[float, float] = (1.0, 1e-3)
     """Entropy temperature: first and last; it falls geometrically over the first 80 % of the run."""
     reward_scale: Literal["log", "raw"] = "log"
     """Learn on the logarithm of the reward, which has the same optimal policy, or on the reward itself."""

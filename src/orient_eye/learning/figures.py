@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from orient_eye.figures import save
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.policy import Policy, plant_in_words
+from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.pulse_step import PulseStep
 from orient_eye.resources import data_folder
 from orient_eye.saccade import K0_RANGE, YAW_RANGE_DEG, Fixation, SaccadeTask, horizontal
@@ -69,10 +70,15 @@ def draw_policy(task: SaccadeTask, policy: Policy, yardstick: Yardstick, path: P
     return save(figure, path)
 
 
-def figure_5_1(policy: Policy, yardstick: Yardstick) -> Figure:
+def figure_5_1(policy: Policy, yardstick: Yardstick, table: Yardstick | None = None) -> Figure:
     """B, D - F, k0, and C when it varies, against saccade size: mean over starting points, beside the optimum.
 
     Thesis Figures 5.1, 5.5, 5.9, 5.10, 5.14, 5.18, 5.19. One row a driven motor.
+
+    Args:
+        policy: whose output it is.
+        yardstick: saccades over the whole range.
+        table: symmetric saccades, drawn apart on a plant that is not linear, where the starting point matters.
     """
     symbols = ("B", "D - F", "k0", "C") if yardstick.task.onset == "varying" else ("B", "D - F", "k0")
     motors = yardstick.task.driven
@@ -80,6 +86,9 @@ def figure_5_1(policy: Policy, yardstick: Yardstick) -> Figure:
     grid = figure.subplots(len(motors), len(symbols), squeeze=False)
     for index, (row, name) in enumerate(zip(grid, motors, strict=True)):
         _draw_output(row, policy, yardstick, symbols, index)
+        if table is not None and not isinstance(table.task.plant, LowPassPlant):
+            _draw_symmetric(row, policy, table, symbols, index)
+        row[0].legend(frameon=False, fontsize="small")
         if len(motors) > 1:
             row[0].set_title(name, loc="left")
     return _titled(figure, "Policy output against saccade size", policy, yardstick.task)
@@ -284,6 +293,21 @@ def _draw_output(
         axes.set_ylim(low - more, high + more)
         _tidy(axes)
     panels[0].legend(frameon=False, fontsize="small")
+
+
+def _draw_symmetric(
+    panels: "Sequence[Axes] | NDArray[Any]", policy: Policy, table: Yardstick, symbols: Sequence[str], motor: int
+) -> None:
+    """The same of saccades around straight ahead only."""
+    task = table.task
+    best = task.pulse_step(table.start, table.optimum.action)
+    ours = _Saccades.symmetric(task, policy, _SIZES_DEG).command
+    for axes, symbol in zip(panels, symbols, strict=True):
+        axes.plot(_SIZES_DEG, _output(ours, symbol)[:, motor], "--", color=_LEARNED, lw=1.2, label="policy, symmetric")
+        axes.plot(
+            table.target_yaw_deg - table.start_yaw_deg, _output(best, symbol)[:, motor], "D", color=_BEST, ms=6,
+            mfc="none", label="searched optimum, symmetric",
+        )  # fmt: skip
 
 
 _LEAST_SPAN = {"B": 10.0, "k0": 4.0}

@@ -49,7 +49,7 @@ class GazeFeatures(BaseFeaturesExtractor):
         return (v * stretch).flatten(1) / _GAZE_RANGE_RAD
 
 
-def falling_temperature(first: float = 1.0, last: float = 3e-3, until: float = 0.8) -> Schedule:
+def falling_temperature(first: float = 1.0, last: float = 1e-3, until: float = 0.8) -> Schedule:
     """Entropy temperature that falls geometrically from first to last over the first share of training.
 
     Returns:

@@ -1,0 +1,118 @@
+"""Train the thesis' five cases on the surrogate and variant 1 on the MuJoCo eye, three seeds each.
+
+    python scripts/results.py runs/results                  # hours of one core; runs that are done are kept
+    python scripts/results.py runs/results --plants lpf --cases 1 --seeds 0
+
+Every run is `orient-eye train` with its defaults. Prints the table of docs/results.md, and with --ship copies
+the best run of each case into models/policies.
+"""
+
+import concurrent.futures
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+from orient_eye.cases import CASES
+
+POLICIES = Path(__file__).resolve().parents[1] / "models" / "policies"
+
+
+@dataclass(frozen=True)
+class Results:
+    """Train all cases and print the table."""
+
+    folder: Annotated[Path, tyro.conf.Positional]
+    """Where the runs go; those already there are not run again."""
+    plants: tuple[str, ...] = ("lpf", "mujoco")
+    """Plants: lpf learns all five cases, mujoco variant 1."""
+    cases: tuple[str, ...] = tuple(CASES)
+    """Cases on lpf."""
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """Of the runs."""
+    parallel: int = 2
+    """Runs on lpf at a time, one core each."""
+    ship: bool = False
+    """Copy the best run of each case into models/policies."""
+
+
+def main(options: Results) -> None:
+    """Run what is missing, then print."""
+    jobs = [("lpf", case, seed) for seed in options.seeds for case in options.cases if "lpf" in options.plants]
+    with concurrent.futures.ThreadPoolExecutor(options.parallel) as pool:
+        list(pool.map(lambda job: run(options.folder, *job), jobs))
+    if "mujoco" in options.plants:  # one at a time: this plant uses all cores
+        for seed in options.seeds:
+            run(options.folder, "mujoco", "1", seed)
+    print(table(options.folder))
+    if options.ship:
+        ship(options.folder)
+
+
+def run(folder: Path, plant: str, case: str, seed: int) -> None:
+    """One training run, gone on with if it was interrupted."""
+    out = folder / f"{plant}-{case}-seed{seed}"
+    if (out / "result.json").exists():
+        return
+    command = [sys.executable, "-m", "orient_eye", "train", "--quiet"]
+    if (out / "checkpoint.pt").exists():
+        command += ["--resume", str(out)]
+    else:
+        shutil.rmtree(out, ignore_errors=True)
+        command += ["--plant", plant, "--case", case, "--seed", str(seed), "--out", str(out)]
+    print("training", out.name, file=sys.stderr)
+    subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}, stderr=subprocess.DEVNULL)
+
+
+def results(folder: Path) -> dict[tuple[str, str], list[dict[str, Any]]]:
+    """The results of all runs, by plant and case, by seed."""
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for path in sorted(folder.glob("*-seed*/result.json")):
+        plant, rest = path.parent.name.split("-", 1)
+        result = json.loads(path.read_text(encoding="utf-8"))
+        found.setdefault((plant, rest.rsplit("-seed", 1)[0]), []).append({**result, "folder": path.parent})
+    return found
+
+
+def table(folder: Path) -> str:
+    """The results as a Markdown table: one row a case, the seeds beside one another."""
+    lines = [
+        "| plant | case | saccades | mean gap % | 95th percentile % | B at 30 deg | D - F | k0 | best found |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for (plant, case), runs in results(folder).items():
+        rows = [next(row for row in run["table"] if row["amplitude_deg"] == 30) for run in runs]
+
+        def by_seed(values: list[float], digits: int) -> str:
+            return ", ".join(f"{value:.{digits}f}" for value in values)
+
+        best = rows[0]
+        lines.append(
+            f"| {plant} | {case} | {runs[0]['saccades']} | {by_seed([100 * r['gap_mean'] for r in runs], 2)} | "
+            f"{by_seed([100 * r['gap_p95'] for r in runs], 2)} | {by_seed([r['B'] for r in rows], 2)} | "
+            f"{by_seed([r['step_deg'] for r in rows], 3)} | {by_seed([r['k0'] for r in rows], 2)} | "
+            f"{best['B_best']:.2f}, {best['step_deg_best']:.3f}, {best['k0_best']:.2f} |"
+        )
+    return "\n".join(lines)
+
+
+def ship(folder: Path) -> None:
+    """Copy the policy with the smallest mean gap of each case."""
+    for (plant, case), runs in results(folder).items():
+        best = runs[int(np.argmin([run["gap_mean"] for run in runs]))]["folder"]
+        target = POLICIES / f"{plant}-{case}"
+        target.mkdir(parents=True, exist_ok=True)
+        for name in ("policy.npz", "policy.json"):
+            shutil.copyfile(best / name, target / name)
+        print(f"models/policies/{target.name}: from {best.name}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Results))
