@@ -7,6 +7,7 @@ bounds, saccades, and the search itself. Delete the folder at any time.
 import contextlib
 import hashlib
 import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -74,5 +75,5 @@ def _read(path: Path) -> Optimum | None:
     try:
         with np.load(path, allow_pickle=False) as file:
             return Optimum(file["action"], file["reward"], int(file["evaluations"]))
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):  # damaged: search again
         return None

@@ -97,6 +97,8 @@ class SaccadeTask:
             )
         if isinstance(self.C, str) and self.C != "varying":
             raise InputError(f"C is a number [1/s], 'varying' or nothing, got {self.C!r}")
+        if not (self.speed_limit > 0 and self.horizon_s > 0):
+            raise InputError(f"speed limit and horizon must be positive, got {self.speed_limit} and {self.horizon_s}")
         if not 0 < self.band < 1:
             raise InputError(f"the settling band is a share of the amplitude between 0 and 1, got {self.band}")
 

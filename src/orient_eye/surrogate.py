@@ -51,8 +51,9 @@ class Surrogate:
         Raises:
             InputError: missing, or not a surrogate.
         """
-        shipped = data_folder("models") / "surrogates" / f"{path}.json"
-        file = shipped if shipped.is_file() else Path(path)
+        folder = data_folder("models") / "surrogates"
+        names = sorted(f.stem for f in folder.glob("*.json"))
+        file = folder / f"{path}.json" if str(path) in names else Path(path)
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
             if content.pop("format") != _FORMAT:
@@ -61,7 +62,6 @@ class Surrogate:
         except (OSError, KeyError, TypeError, ValueError, AttributeError) as error:
             if isinstance(error, InputError):
                 raise
-            names = sorted(f.stem for f in shipped.parent.glob("*.json"))
             raise InputError(
                 f"{path} is no surrogate ({error}); give a surrogate.json written by orient-eye sysid, "
                 f"or a shipped one: {', '.join(names)}"

@@ -28,13 +28,31 @@ def _commands(chosen: Sequence[str]) -> Any:
     """The union type of all commands, in the order of the help page."""
     import tyro
 
+    from orient_eye.cli.evaluate import Evaluate
+    from orient_eye.cli.export import Export
+    from orient_eye.cli.models import Models
+    from orient_eye.cli.optimum import OptimumCommand
+    from orient_eye.cli.predict import Predict
     from orient_eye.cli.simulate import Simulate
     from orient_eye.cli.sysid import Sysid
     from orient_eye.cli.train import Train
     from orient_eye.cli.validate import Validate
     from orient_eye.cli.view import View
+    from orient_eye.cli.weights import WeightsCommand
 
-    named = {"sysid": Sysid, "train": Train, "simulate": Simulate, "validate": Validate, "view": View}
+    named = {
+        "simulate": Simulate,
+        "view": View,
+        "sysid": Sysid,
+        "train": Train,
+        "models": Models,
+        "predict": Predict,
+        "evaluate": Evaluate,
+        "export": Export,
+        "optimum": OptimumCommand,
+        "weights": WeightsCommand,
+        "validate": Validate,
+    }
     # Union and Annotated, made by program: a type checker reads neither from variables.
     members = [
         operator.getitem(

@@ -5,7 +5,6 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from orient_eye.cases import get_case
 from orient_eye.errors import InputError
 
 
@@ -59,6 +58,8 @@ class TrainConfig:
         Raises:
             InputError: a number out of its range.
         """
+        from orient_eye.cases import get_case  # the physics, which --help does not wait for
+
         closed_form = self.plant == "lpf"
         weights = get_case(self.case).weights
         defaults = {

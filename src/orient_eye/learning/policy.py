@@ -63,6 +63,8 @@ class Policy:
     manifest: dict[str, Any]
 
     def __post_init__(self) -> None:
+        for name in ("weights", "biases"):  # one memory layout: a policy from a file gives the very same numbers
+            object.__setattr__(self, name, tuple(np.ascontiguousarray(a, dtype=float) for a in getattr(self, name)))
         for array in (*self.weights, *self.biases, self.low, self.high):
             if not np.isfinite(array).all():
                 raise InputError("a policy needs finite numbers, this one holds NaN or infinity: its training diverged")

@@ -7,7 +7,7 @@ evaluation.json (the searched optimum), stages/ (evaluation saccades at several 
 policy.npz and policy.json, result.json, learning.png, policy.png and recording.rrd.
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -231,9 +231,8 @@ class _Run:
             "failed_saccades": loop.failed,
             "table": amplitude_table(table, policy.act),
         }
-        Policy(policy.weights, policy.biases, policy.low, policy.high, {**policy.manifest, "result": result}).save(
-            self.run.path
-        )
+        found = {key: value for key, value in result.items() if key != "out"}  # no path of this machine
+        replace(policy, manifest={**policy.manifest, "result": found}).save(self.run.path)
         draw_learning(self.run.path / "metrics.csv", self.run.path / "learning.png")
         draw_policy(self.task, policy, yardstick, self.run.path / "policy.png")
         record_stages(self.task, self.run.path, table)
