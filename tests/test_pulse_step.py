@@ -142,11 +142,10 @@ def test_against_quadrature(variant: int, C: float, B: float) -> None:
 @pytest.mark.parametrize("gap", [0.0, *(sign * 10.0**-k for k in range(3, 13) for sign in (1, -1))])
 def test_against_quadrature_where_a_pole_meets_w0(variant: int, gap: float) -> None:
     """B = w0, and B + C = w0, exactly and nearly: there the partial fractions divide zero by zero."""
-    for k0 in (12.0, 17.5):
-        hold_against_quadrature(Plain(variant, 3.0, W0 + gap, 21.0, k0, 3.6))
-        if variant in FIXED_C:
-            C = 3.6
-            hold_against_quadrature(Plain(variant, 3.0, W0 + gap - C, 21.0, k0, C))
+    k0 = W0 if gap == 0 else 12.0
+    hold_against_quadrature(Plain(variant, 3.0, W0 + gap, 21.0, k0, 3.6))
+    if variant in FIXED_C:
+        hold_against_quadrature(Plain(variant, 3.0, W0 + gap - 3.6, 21.0, k0, 3.6))
 
 
 @properties

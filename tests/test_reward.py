@@ -294,8 +294,8 @@ def random_pairs(count: int, task: SaccadeTask = TASK) -> tuple[Fixation, Array]
 
 
 def test_another_search_finds_no_better() -> None:
-    """50 random pairs, other seed, fewer candidates for longer."""
-    start, target = random_pairs(50)
+    """45 random pairs, other seed, fewer candidates for longer."""
+    start, target = random_pairs(45)
     found = find_optimum(TASK, start, target, np.random.default_rng(1))
     other = find_optimum(TASK, start, target, np.random.default_rng(2), population=24, generations=75)
     gap = (other.reward - found.reward) / np.abs(other.reward)

@@ -87,9 +87,10 @@ def _command(folder: Path, *options: str) -> list[str]:
     return [sys.executable, "-m", "orient_eye", "train", "--quiet", "--out", str(folder), *options]
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
-def test_killed_and_resumed_is_the_run_never_stopped(how: signal.Signals, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("how", "temperature"), [(signal.SIGKILL, "auto"), (signal.SIGINT, "1 0.01")])
+def test_killed_and_resumed_is_the_run_never_stopped(how: signal.Signals, temperature: str, tmp_path: Path) -> None:
     options = ["--updates", "400", "--saccades-per-update", "16", "--batch-size", "64", "--evaluation-pairs", "4"]
+    options += ["--temperature", *temperature.split()]
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
     process = subprocess.Popen(_command(stopped, *options, "--checkpoint-every", "0.2"), stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
@@ -159,3 +160,19 @@ def test_trains_on_the_whole_eye(tmp_path: Path) -> None:
     assert result["plant"] == "mujoco"
     manifest = json.loads((tmp_path / "run" / "policy.json").read_text())
     assert manifest["task"]["plant"] == make_plant("mujoco").identity()
+
+
+def test_preset_of_the_thesis_and_options_beside_it() -> None:
+    config = TrainConfig(preset="thesis", batch_size=512).resolved()
+    assert (config.learning_rate, config.replay_size, config.updates) == (1e-5, 30_000, 300_000)  # thesis 4.6
+    assert config.batch_size == 512
+    assert config.temperature == "auto"
+    assert TrainConfig(plant="mujoco").resolved().saccades_per_update == 32
+
+
+def test_device_that_is_not_there() -> None:
+    import torch
+
+    wrong = "fpga" if torch.cuda.is_available() else "cuda"
+    with pytest.raises(InputError, match=f"--device .*{wrong}"):
+        TrainConfig(device=wrong).resolved()

@@ -34,6 +34,7 @@ def save_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv, extra: 
         "policy": model.policy.state_dict(),
         "actor_optimizer": model.actor.optimizer.state_dict(),
         "critic_optimizer": model.critic.optimizer.state_dict(),
+        "temperature": _temperature(model),
         "rows": torch.from_numpy(buffer.rows[: buffer.size()]),
         "torch_random": torch.get_rng_state(),
         "plain": json.dumps(
@@ -65,6 +66,11 @@ def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict
         model.policy.load_state_dict(content["policy"])
         model.actor.optimizer.load_state_dict(content["actor_optimizer"])
         model.critic.optimizer.load_state_dict(content["critic_optimizer"])
+        if content["temperature"]:
+            assert model.log_ent_coef is not None
+            assert model.ent_coef_optimizer is not None
+            model.log_ent_coef.data.copy_(content["temperature"]["log"])
+            model.ent_coef_optimizer.load_state_dict(content["temperature"]["optimizer"])
         buffer = _buffer(model)
         buffer.rows[: len(content["rows"])] = content["rows"].numpy()
     except FileNotFoundError as error:
@@ -85,3 +91,10 @@ def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict
 def _buffer(model: OneStepSAC) -> OneStepReplayBuffer:
     assert isinstance(model.replay_buffer, OneStepReplayBuffer)
     return model.replay_buffer
+
+
+def _temperature(model: OneStepSAC) -> dict[str, Any] | None:
+    """What the automatic rule has learned, where it is in use."""
+    if model.log_ent_coef is None or model.ent_coef_optimizer is None:
+        return None
+    return {"log": model.log_ent_coef.detach(), "optimizer": model.ent_coef_optimizer.state_dict()}

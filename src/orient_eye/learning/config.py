@@ -13,6 +13,31 @@ def _default(words: str) -> Any:
     return tyro.conf.arg(help_behavior_hint=f"(default: {words})")
 
 
+_PRESETS: dict[str, dict[str, Any]] = {
+    "ours": {
+        "updates": 14_000,
+        "batch_size": 512,
+        "replay_size": 300_000,
+        "warmup": 2048,
+        "learning_rate": 1e-3,
+        "last_learning_rate": 0.03,
+        "temperature": (1.0, 1e-3),
+        "reward_scale": "log",
+    },
+    "thesis": {  # 4.6; it says nothing of the temperature
+        "updates": 300_000,
+        "saccades_per_update": 1,
+        "batch_size": 8196,
+        "replay_size": 30_000,
+        "warmup": 8196,
+        "learning_rate": 1e-5,
+        "last_learning_rate": 1.0,
+        "temperature": "auto",
+        "reward_scale": "raw",
+    },
+}
+
+
 @dataclass(frozen=True)
 class TrainConfig:
     """Options of a training run. Where a default depends on the plant, None stands for it."""
@@ -31,22 +56,29 @@ class TrainConfig:
     """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32; orient-eye weights)."""
     band: float = 0.01
     """Settling band, share of the amplitude."""
-    updates: int = 14_000
+    preset: Literal["ours", "thesis"] = "ours"
+    """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
+    updates: Annotated[int | None, _default("14000; thesis 300000")] = None
     """Updates of the networks."""
-    saccades_per_update: Annotated[int | None, _default("128 on lpf, 32 on other plants")] = None
+    saccades_per_update: Annotated[int | None, _default("128 on lpf, 32 on other plants; thesis 1")] = None
     """Fresh saccades before each update."""
-    batch_size: int = 512
+    batch_size: Annotated[int | None, _default("512; thesis 8196")] = None
     """Saccades an update learns from."""
-    replay_size: int = 300_000
+    replay_size: Annotated[int | None, _default("300000; thesis 30000")] = None
     """Saccades the replay buffer holds."""
-    warmup: int = 2048
+    warmup: Annotated[int | None, _default("2048; thesis 8196")] = None
     """Saccades with random actions before the first update."""
-    learning_rate: float = 1e-3
-    """Of Adam; it falls linearly to 3 % of this over the last fifth of the run."""
-    temperature: tuple[float, float] = (1.0, 1e-3)
-    """Entropy temperature: first and last; it falls geometrically over the first 80 % of the run."""
-    reward_scale: Literal["log", "raw"] = "log"
+    learning_rate: Annotated[float | None, _default("0.001; thesis 0.00001")] = None
+    """Of Adam."""
+    last_learning_rate: Annotated[float | None, _default("0.03; thesis 1")] = None
+    """Share of the learning rate to which it falls, linearly, over the last fifth of the run."""
+    temperature: Annotated[tuple[float, float] | Literal["auto"] | None, _default("1 0.001; thesis auto")] = None
+    """Entropy temperature: first and last (it falls geometrically over the first 80 % of the run), or auto for
+    SB3's automatic rule."""
+    reward_scale: Annotated[Literal["log", "raw"] | None, _default("log; thesis raw")] = None
     """Learn on the logarithm of the reward, which has the same optimal policy, or on the reward itself."""
+    device: str = "cpu"
+    """Where the networks live: cpu, or cuda."""
     evaluation_pairs: Annotated[int | None, _default("300 on lpf, 60 on other plants")] = None
     """Random saccades held against the searched optimum."""
     seed: int = 0
@@ -63,16 +95,26 @@ class TrainConfig:
         closed_form = self.plant == "lpf"
         weights = get_case(self.case).weights
         defaults = {
-            "weights": (weights.accuracy, weights.energy, weights.duration, weights.overshoot),
             "saccades_per_update": 128 if closed_form else 32,
+            **_PRESETS[self.preset],
+            "weights": (weights.accuracy, weights.energy, weights.duration, weights.overshoot),
             "evaluation_pairs": 300 if closed_form else 60,
         }
-        config = replace(self, **{k: v for k, v in defaults.items() if getattr(self, k) is None})  # type: ignore[arg-type]
+        config = replace(self, **{k: v for k, v in defaults.items() if getattr(self, k) is None})
         for name in ("updates", "saccades_per_update", "batch_size", "replay_size", "warmup", "evaluation_pairs"):
             if getattr(config, name) < 1:
                 raise InputError(f"--{name.replace('_', '-')} must be at least 1, got {getattr(config, name)}")
-        if not config.learning_rate > 0 or not min(config.temperature) > 0:
-            raise InputError("--learning-rate and --temperature must be positive")
+        for name in ("learning_rate", "last_learning_rate", "temperature"):
+            value = getattr(config, name)
+            if value != "auto" and not min(value if isinstance(value, tuple) else (value,)) > 0:
+                raise InputError(f"--{name.replace('_', '-')} must be positive, got {value}")
         if config.seed < 0:
             raise InputError(f"--seed must not be negative, got {config.seed}")
+        if config.device.startswith("cuda"):
+            import torch
+
+            if not torch.cuda.is_available():
+                raise InputError(f"--device {config.device}: this machine or this build of torch has no CUDA; use cpu")
+        elif config.device != "cpu":
+            raise InputError(f"--device is cpu or cuda, got {config.device!r}")
         return config

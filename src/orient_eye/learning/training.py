@@ -147,19 +147,21 @@ class _Run:
 
     def _warmup_steps(self) -> int:
         assert self.config.saccades_per_update
+        assert self.config.warmup
         return -(-self.config.warmup // self.config.saccades_per_update)
 
     def _model(self, env: SaccadeVecEnv, *, seed: int, buffer_seed: int) -> OneStepSAC:
         config = self.config
-
-        def learning_rate(remaining: float) -> float:
-            return config.learning_rate * max(min(remaining / 0.2, 1.0), 0.03)
-
+        assert config.learning_rate
+        assert config.last_learning_rate
+        assert config.batch_size
+        assert config.replay_size
+        rate, last = config.learning_rate, config.last_learning_rate
         model = OneStepSAC(
             "MlpPolicy",
             env,
-            temperature=falling_temperature(*config.temperature),
-            learning_rate=learning_rate,
+            temperature=falling_temperature(*config.temperature) if isinstance(config.temperature, tuple) else None,
+            learning_rate=lambda remaining: rate * max(min(remaining / 0.2, 1.0), last),
             batch_size=config.batch_size,
             buffer_size=config.replay_size,
             replay_buffer_class=OneStepReplayBuffer,
@@ -168,7 +170,7 @@ class _Run:
             train_freq=1,
             gradient_steps=1,
             seed=seed,
-            device="cpu",
+            device=config.device,
             policy_kwargs={
                 "net_arch": _NETS,
                 "features_extractor_class": GazeFeatures,
@@ -193,8 +195,8 @@ class _Run:
     def policy(self, model: OneStepSAC, result: dict[str, Any]) -> Policy:
         """The mean of the policy, out of torch."""
         layers = [m for m in [*model.actor.latent_pi, model.actor.mu] if isinstance(m, torch.nn.Linear)]
-        weights = tuple(layer.weight.detach().numpy().T.astype(float) for layer in layers)
-        biases = tuple(layer.bias.detach().numpy().astype(float) for layer in layers)
+        weights = tuple(layer.weight.detach().cpu().numpy().T.astype(float) for layer in layers)
+        biases = tuple(layer.bias.detach().cpu().numpy().astype(float) for layer in layers)
         manifest = {
             "case": self.config.case,
             "task": self.task.identity(),
