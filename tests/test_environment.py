@@ -361,6 +361,7 @@ def test_seeds_of_the_batch() -> None:
     for env in (again, other_plant):
         for a, b in zip(reference, drawn(env), strict=True):
             np.testing.assert_allclose(a, b, atol=1e-7)
+    assert (np.asarray(by_seed.reset()) != reference[0]).any()  # a seed counts for one reset
     np.testing.assert_array_equal(drawn(SaccadeVecEnv(3, seed=4)), drawn(SaccadeVecEnv(3, seed=4)))
     assert (np.array(drawn(SaccadeVecEnv(3, seed=4))) != np.array(drawn(SaccadeVecEnv(3, seed=5)))).any()
     unseeded = SaccadeVecEnv(3, seed=4)

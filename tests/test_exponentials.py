@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from orient_eye.exponentials import ExponentialSum, Term
+from orient_eye.exponentials import ExponentialSum, Term, filter_energy
 
 Array = NDArray[np.float64]
 POWERS = (0, 1, 2)
@@ -117,18 +117,22 @@ def test_derivative_by_complex_step(terms: list[tuple[float, int, float]], t: fl
 
 
 @properties
-@given(terms=st.lists(term, min_size=1, max_size=4))
-def test_square_integral_against_quadrature(terms: list[tuple[float, int, float]]) -> None:
-    rates = sorted({p for _, _, p in terms})
-    knots = sorted({x / p for p in rates for x in (1.0, 5.0, 25.0)})
-    end = 40 / rates[0]
-    area = quad(
-        lambda s: plain(terms, s) ** 2, 0, end, points=[k for k in knots if k < end], epsabs=0, epsrel=1e-12, limit=400
-    )[0]
-    squares = sum(  # of the terms alone, without the cross terms that may cancel them
-        c**2 * float(mpmath.factorial(2 * n)) / (2 * p) ** (2 * n + 1) for c, n, p in terms
-    )
-    assert build(terms).square_integral()[0] == pytest.approx(area, abs=1e-11 * squares)
+@given(
+    poles=st.lists(st.floats(1, 100), min_size=2, max_size=3),
+    apart=st.sampled_from([0.0, 1e-9, 1e-3, 1.0]),
+    zero=st.floats(0.5, 60),
+)
+def test_filter_energy_against_the_frequency_domain(poles: list[float], apart: float, zero: float) -> None:
+    """Parseval: the integral over frequency, with poles also together or nearly so."""
+    poles[-1] = poles[0] + apart
+
+    def density(log_w: float) -> float:
+        w = np.exp(log_w)
+        return w * abs((1j * w + zero) / np.prod([1j * w + p for p in poles])) ** 2
+
+    area = quad(density, -20, 40, points=np.log([*poles, zero]), epsabs=0, epsrel=1e-12, limit=500)[0] / np.pi
+    found = filter_energy([np.array([p]) for p in poles], np.array([zero]))
+    assert found[0] == pytest.approx(area, rel=1e-8)
 
 
 def test_derivative_integrates_back() -> None:
@@ -161,4 +165,3 @@ def test_batches_are_their_rows() -> None:
                 rows = [alone(at), alone.integral(at), alone.low_pass(w[i, j], at), alone.derivative()(at)]
                 for together, row in zip(batch, rows, strict=True):
                     np.testing.assert_array_equal(together[i, j], row)
-    assert total.square_integral().shape == (4, 3)

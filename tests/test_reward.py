@@ -71,7 +71,7 @@ def test_accuracy_near_the_target_keeps_its_digits(exponent: float, flips: tuple
     angle = 10.0**exponent
     at = flips[0] * from_yaw([angle])
     found = reward(measures(1, at_settling=at), np.zeros(1), flips[1] * FORWARD[None], WEIGHTS)
-    assert found.accuracy[0] == pytest.approx(-(np.sin(np.deg2rad(angle) / 2) ** 2), rel=1e-12)
+    assert found.accuracy[0] == pytest.approx(-(np.sin(np.deg2rad(angle) / 2) ** 2), rel=1e-12, abs=0)
 
 
 def test_no_term_is_positive_and_the_best_is_zero() -> None:

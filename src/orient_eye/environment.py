@@ -133,16 +133,13 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         unknown = set(options) - {"start_yaw_deg", "target_yaw_deg"}
         if unknown:
             raise InputError(f"unknown reset options {sorted(unknown)}; there are start_yaw_deg and target_yaw_deg")
-        drawn = self.task.draw_yaw(1, self.np_random)
+        start, target = self.task.draw_yaw(1, self.np_random)
         yaw = [
-            np.atleast_1d(np.asarray(options.get(name, value[0]), float))
-            for name, value in zip(("start_yaw_deg", "target_yaw_deg"), drawn, strict=True)
+            _one_angle(name, options.get(name, drawn[0]))
+            for name, drawn in (("start_yaw_deg", start), ("target_yaw_deg", target))
         ]
-        for name, value in zip(("start_yaw_deg", "target_yaw_deg"), yaw, strict=True):
-            if value.shape != (1,) or not np.isfinite(value).all():
-                raise InputError(f"{name} is one finite number of degrees, got {options[name]!r}")
         self._start, self._target = self.task.fixate(horizontal(yaw[0])), horizontal(yaw[1])
-        info = {"start_yaw_deg": float(yaw[0][0]), "target_yaw_deg": float(yaw[1][0])}
+        info = {"start_yaw_deg": yaw[0], "target_yaw_deg": yaw[1]}
         return observe(self._start.orientation, self._target)[0], info
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -155,6 +152,16 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         final = np.where(outcome.measures.failed[:, None], self._start.orientation, outcome.measures.final)
         self._start = None
         return observe(final, self._target)[0], value, True, False, describe(outcome)[0]
+
+
+def _one_angle(name: str, value: Any) -> float:
+    try:
+        angle = float(np.asarray(value, float).reshape(()))
+    except (TypeError, ValueError):
+        angle = np.nan
+    if not np.isfinite(angle):
+        raise InputError(f"{name} is one finite number of degrees, got {value!r}")
+    return angle
 
 
 def describe(outcome: Outcome) -> list[dict[str, Any]]:

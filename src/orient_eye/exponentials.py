@@ -1,13 +1,14 @@
 """Sums of terms c t^n exp(-p t): the algebra in which every pulse and its consequences are closed.
 
 A pulse of the pulse-step generator (thesis 4.3) is such a sum. Its derivative is one again; its
-integral, its low-pass response and the integral of its square follow below, accurate also where
-p meets the cut-off frequency of the plant and the textbook formulas divide zero by zero.
+integral and its low-pass response follow below, accurate also where p meets the cut-off frequency of
+the plant and the textbook formulas divide zero by zero.
 
 Coefficients c and rates p are arrays of one common batch shape (...); times t have the shape
 (..., time) and results too.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial
 
@@ -69,21 +70,29 @@ class ExponentialSum:
             total = total + x.c[..., None] * w * t ** (x.n + 1) * slower * moment
         return total
 
-    def square_integral(self) -> Array:
-        """Integral of the square over 0..infinity, (...)."""
-        total = np.zeros(())
-        for x in self.terms:
-            for y in self.terms:
-                n = x.n + y.n
-                total = total + x.c * y.c * factorial(n) / (x.p + y.p) ** (n + 1)
-        return total
-
     def __add__(self, other: "ExponentialSum") -> "ExponentialSum":
         return ExponentialSum(self.terms + other.terms)
 
     def scaled(self, factor: Array | float) -> "ExponentialSum":
         """The sum times a factor (...)."""
         return ExponentialSum(tuple(Term(x.c * factor, x.n, x.p) for x in self.terms))
+
+
+def filter_energy(poles: Sequence[Array], zero: Array) -> Array:
+    """Integral over 0..infinity of the square of the impulse response of (s + z) / ((s + p1) (s + p2) ...), (...).
+
+    Parseval's integral for two or three poles. All its terms are positive: nothing cancels where poles
+    nearly meet, as it does in the sum over pairs of exponentials.
+
+    Args:
+        poles: two or three rates p > 0, each (...).
+        zero: z, (...).
+    """
+    if len(poles) == 2:
+        p, q = poles
+        return (p * q + zero**2) / (2 * p * q * (p + q))
+    p, q, r = poles
+    return (p * q * r + zero**2 * (p + q + r)) / (2 * p * q * r * (p + q) * (p + r) * (q + r))
 
 
 def _moment(n: int, z: Array) -> Array:

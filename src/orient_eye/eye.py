@@ -119,11 +119,28 @@ def tendon_tension(model: mujoco.MjModel, length: Array) -> Array:
     return model.tendon_stiffness * np.maximum(length - model.tendon_lengthspring[:, 1], 0)
 
 
+_PHYSICS = (
+    "body_parentid", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia",
+    "jnt_type", "jnt_bodyid", "jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness", "dof_damping", "dof_armature",
+    "dof_frictionloss", "site_bodyid", "site_pos", "site_quat", "tendon_stiffness", "tendon_damping",
+    "tendon_lengthspring", "wrap_type", "wrap_objid", "wrap_prm", "actuator_trntype", "actuator_trnid",
+    "actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange",
+)  # fmt: skip
+
+
 def model_hash(model: mujoco.MjModel) -> str:
-    """Identity of an eye compiled without its looks: SHA-256 over its binary form, 16 digits."""
-    buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return hashlib.sha256(buffer.tobytes()).hexdigest()[:16]
+    """Identity of an eye: SHA-256 over everything that moves it, 16 digits.
+
+    Numbers count to 12 digits and looks do not, so that neither the machine nor another version of MuJoCo
+    makes the same eye another one.
+    """
+    option = model.opt
+    numbers = {
+        "option": [option.timestep, option.integrator, option.disableflags, *option.gravity],
+        **{name: getattr(model, name).ravel() for name in _PHYSICS},
+    }
+    text = "\n".join(f"{name} {' '.join(f'{x + 0.0:.12g}' for x in values)}" for name, values in numbers.items())
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)

@@ -195,6 +195,14 @@ def measure_response(response: LowPassResponse, *, band: float = BAND) -> Measur
         return np.stack([ahead * x2[:, 0], x1[:, 1], exit_], axis=1), np.stack(slope, axis=1)
 
     root = _falling_root(low, high, function_and_slope)
+    # A crest that leaves the band between two points of the grid: the last exit is behind it.
+    crest = response.motion(root)[0][:, 1]
+    late = turns & (crest > 1 + band) & (root[:, 2] < root[:, 1])
+    if late.any():
+        side = np.where(late, 1.0, side)
+        low[:, 2] = np.where(late, root[:, 1], low[:, 2])
+        high[:, 2] = np.where(late, t[rows, np.minimum(top + 1, end)], high[:, 2])
+        root = np.where(late[:, None], _falling_root(low, high, function_and_slope), root)
     root[:, 0] = np.where(fastest == 0, 0.0, root[:, 0])
     at_root, speed_at_root = response.motion(root)[:2]
     overshoot = np.where(turns, np.maximum(at_root[:, 1] - 1, 0), 0.0)

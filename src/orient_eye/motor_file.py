@@ -32,7 +32,7 @@ def read_command(path: str | Path, plant: Plant, *, horizon_s: float | None = No
         InputError: missing file, unknown or missing columns, numbers that are none, time that goes back,
             or a motor commanded that the plant lacks.
     """
-    table = _read_columns(Path(path))
+    table, lines = _read_columns(Path(path))
     if "t_s" not in table:
         raise InputError(f"{path} has the columns {', '.join(table)}; it needs t_s [s] and tau1_deg, tau2_deg, ...")
     time = table.pop("t_s")
@@ -46,8 +46,8 @@ def read_command(path: str | Path, plant: Plant, *, horizon_s: float | None = No
     if not set(table) & set(columns):
         raise InputError(f"{path} commands no motor; add a column, one of {', '.join(columns)}")
     if (np.diff(time) < 0).any():
-        row = int(np.flatnonzero(np.diff(time) < 0)[0]) + 3
-        raise InputError(f"{path}, line {row}: t_s goes back; sort the rows by time")
+        line = lines[int(np.flatnonzero(np.diff(time) < 0)[0]) + 1]
+        raise InputError(f"{path}, line {line}: t_s goes back; sort the rows by time")
     duration = time[-1] - time[0] if horizon_s is None else horizon_s
     if not 0 < duration <= 3600:
         raise InputError(f"a command lasts between one step and one hour, this one {duration:g} s")
@@ -62,7 +62,7 @@ def read_command(path: str | Path, plant: Plant, *, horizon_s: float | None = No
 
 def rest_position(path: str | Path, plant: Plant) -> Array:
     """Motor positions of the first row [deg], (1, motors): where the eye rests before the command."""
-    table = _read_columns(Path(path))
+    table, _ = _read_columns(Path(path))
     return np.array([[table[c][0] if (c := motor_column(name)) in table else 0.0 for name in plant.motors]])
 
 
@@ -79,17 +79,19 @@ def _is_motor(column: str) -> bool:
     return column.startswith("tau") and column.endswith("_deg")
 
 
-def _read_columns(path: Path) -> dict[str, Array]:
+def _read_columns(path: Path) -> tuple[dict[str, Array], list[int]]:
+    """Columns by name, and the line of each row."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if row]
+            reader = csv.reader(file)
+            lines = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"cannot read {path}: {error}") from error
-    if len(rows) < 2:
+    if len(lines) < 2:
         raise InputError(f"{path} needs a header (t_s,tau1_deg,tau2_deg,tau3_deg) and at least one row of numbers")
-    header = [name.strip() for name in rows[0]]
+    header = [name.strip() for name in lines[0][1]]
     values = []
-    for line, row in enumerate(rows[1:], start=2):
+    for line, row in lines[1:]:
         try:
             numbers = [float(x) for x in row]
         except ValueError as error:
@@ -99,4 +101,4 @@ def _read_columns(path: Path) -> dict[str, Array]:
         values.append(numbers)
     if len(set(header)) != len(header):
         raise InputError(f"{path}: a column stands twice in the header {', '.join(header)}")
-    return dict(zip(header, np.array(values).T, strict=True))
+    return dict(zip(header, np.array(values).T, strict=True)), [line for line, _ in lines[1:]]

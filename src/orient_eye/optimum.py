@@ -83,6 +83,8 @@ def find_optimum(
     each, columns = np.arange(saccades)[:, None], np.arange(population)
     restarts = {round(share * generations): spread for share, spread in _RESTARTS.items()}
     for generation in range(generations):
+        if progress:
+            progress((generation + 1) / generations)
         best = np.take_along_axis(mates[None], value[:, mates].argmax(axis=2)[..., None], axis=2)[..., 0]
         if generation in restarts:
             near = np.tile(_NEAR, driven) * restarts[generation]
@@ -101,8 +103,6 @@ def find_optimum(
         trial_value = judge(trial)
         better = trial_value >= value
         x, value = np.where(better[..., None], trial, x), np.where(better, trial_value, value)
-        if progress:
-            progress((generation + 1) / generations)
     winner = value.argmax(axis=1)
     action = low + x[np.arange(saccades), winner] * (high - low)
     return Optimum(action.reshape(saccades, driven, 3), value.max(axis=1), saccades * population * (generations + 1))

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.exponentials import ExponentialSum, Term
+from orient_eye.exponentials import ExponentialSum, Term, filter_energy
 
 Array = NDArray[np.float64]
 SPEED_LIMIT = 7200.0
@@ -49,8 +49,14 @@ def _variant3(B: Array, k0: Array, C: Array) -> ExponentialSum:
 
 
 PULSES: dict[int, Callable[[Array, Array, Array], ExponentialSum]] = {1: _variant1, 2: _variant2, 3: _variant3}
-"""Variant to the pulse that takes a motor 1 deg (D - F = 1), from B, k0 and C. A new pulse is one
-function here."""
+"""Variant to the pulse that takes a motor 1 deg (D - F = 1), from B, k0 and C."""
+POLES: dict[int, Callable[[Array, Array], tuple[Array, ...]]] = {
+    1: lambda B, C: (B, B),
+    2: lambda B, C: (B, B + C),
+    3: lambda B, C: (B, B + C, B + C),
+}
+"""Variant to the poles of its pulse, from B and C (4.4, 4.12, 4.21): p(s) = (D - F) / k0 times the product
+of p / (s + p)."""
 FIXED_C = {2: 85.0, 3: 3.6}
 """The thesis' values of C [1/s] (5.2.1, 5.3.1)."""
 
@@ -151,7 +157,9 @@ class PulseStep:
 
     def energy(self) -> Array:
         """Integral of the squared motor speeds over all time and motors [deg^2/s], (saccades,); 4.35."""
-        return (self.step**2 * self._rate_shape.square_integral()).sum(axis=-1)
+        poles = POLES[self.variant](self.B, np.asarray(self.C))
+        height = self.step * np.prod(np.stack(poles), axis=0) / self.k0
+        return (height**2 * filter_energy(poles, self.k0)).sum(axis=-1)
 
     def sample(self, step_s: float, samples: int) -> Array:
         """Motor positions [deg] (saccades, samples, motors) at 0, step_s, 2 step_s, ... [s]."""

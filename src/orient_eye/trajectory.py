@@ -7,6 +7,8 @@
 The .npz is the durable record: arrays named as the attributes, and nothing that needs pickle.
 """
 
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -98,7 +100,12 @@ class Trajectory:
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         if self.tension is None:
             del arrays["tension"]
-        return write_atomically(path, lambda temporary: np.savez_compressed(temporary, **arrays))
+
+        def write(temporary: Path) -> None:
+            with temporary.open("wb") as file:  # given a name, numpy would add .npz to it
+                np.savez_compressed(file, **arrays)
+
+        return write_atomically(path, write)
 
     @classmethod
     def load_npz(cls, path: str | Path) -> "Trajectory":
@@ -112,7 +119,7 @@ class Trajectory:
                 arrays: dict[str, Any] = dict(file)
             names: dict[str, Any] = {k: tuple(map(str, arrays.pop(k))) for k in ("motor_names", "tendon_names")}
             return cls(tension=arrays.pop("tension", None), **arrays, **names)
-        except (OSError, KeyError, TypeError, ValueError) as error:
+        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path} is not a trajectory file (.npz written by orient-eye): {error}") from error
 
     def to_csv(self, path: str | Path) -> Path:

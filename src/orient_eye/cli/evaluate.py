@@ -94,8 +94,9 @@ def _measure(policy: "Policy", pairs: "Yardstick", table: "Yardstick", path: Pat
     """The numbers of result.json; pairs.csv is written on the way."""
     import numpy as np
 
-    from orient_eye.cli.predict import saccade_rows, write_csv
-    from orient_eye.learning.evaluation import amplitude_table
+    from orient_eye.cli.predict import saccade_rows
+    from orient_eye.files import write_table
+    from orient_eye.learning.evaluation import amplitude_table, gap_summary
     from orient_eye.rotations import to_euler
 
     action, outcome, gap = pairs.perform(policy.act)
@@ -104,23 +105,14 @@ def _measure(policy: "Policy", pairs: "Yardstick", table: "Yardstick", path: Pat
     best_rows = saccade_rows(pairs.task, pairs.start_yaw_deg, pairs.target_yaw_deg, best)
     same = ("start_yaw_deg", "target_yaw_deg", "F")
     beside = [{f"{k}_best": v for k, v in row.items() if not k.startswith(same)} for row in best_rows]
-    write_csv(path, [{**row, "gap": float(g), **other} for row, g, other in zip(rows, gap, beside, strict=True)])
-    large = np.abs(pairs.target_yaw_deg - pairs.start_yaw_deg) > 5
-    off = np.abs(action - pairs.optimum.action)[large]
+    write_table(path, [{**row, "gap": float(g), **other} for row, g, other in zip(rows, gap, beside, strict=True)])
     yaw_error = np.abs(to_euler(outcome.measures.final)[0] - pairs.target_yaw_deg)
     return {
-        "pairs": len(gap),
-        "gap_mean": float(gap.mean()),
-        "gap_p95": float(np.quantile(gap, 0.95)),
-        "gap_max": float(gap.max()),
-        "reward_mean": float(outcome.reward.total.mean()),
+        **gap_summary(pairs, action, outcome, gap),
         "yaw_error_mean_deg": float(np.nanmean(yaw_error)),
         "yaw_error_max_deg": float(np.nanmax(yaw_error)),
         "overshoot_max": float(np.nanmax(outcome.measures.overshoot)),
         "failed_saccades": int(outcome.measures.failed.sum()),
-        "distance_from_optimum_above_5_deg": dict(
-            zip(["B", "D", "k0"], off.mean(axis=(0, 1)).tolist() if large.any() else [None] * 3, strict=True)
-        ),
         "table": amplitude_table(table, policy.act),
     }
 

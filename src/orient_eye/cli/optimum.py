@@ -99,7 +99,9 @@ class OptimumCommand:
                 f"{100 * result['check_largest_loss']:.2g} %"
             )
         if self.out:
-            _write_csv(self.out, rows)
+            from orient_eye.files import write_table
+
+            write_table(self.out, rows)
             say(f"in {self.out}")
         return {**result, "out": str(self.out) if self.out else None, "saccades": rows}
 
@@ -286,6 +288,7 @@ def _rows(task: "SaccadeTask", start_yaw: "Array", target_yaw: "Array", best: "O
 
 
 def _table(rows: list[dict[str, Any]]) -> "Table":
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table()
@@ -310,27 +313,10 @@ def _table(rows: list[dict[str, Any]]) -> "Table":
     if "check_gain" not in rows[0]:
         del shown["second search"]
     for name in shown:
-        table.add_column(name, justify="right")
+        table.add_column(escape(name), justify="right")
     for row in rows:
         table.add_row(*(text(row) for text in shown.values()))
     return table
-
-
-def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    import csv
-    import io
-
-    from orient_eye.errors import InputError
-    from orient_eye.files import write_text
-
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    try:
-        write_text(path, text.getvalue())
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error}; name another file with --out") from error
 
 
 def _progress_bar(quiet: bool) -> Any:

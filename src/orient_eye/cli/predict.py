@@ -106,7 +106,9 @@ class Predict:
         if outcome.measures.failed.any():
             say(f"[red]{int(outcome.measures.failed.sum())} simulated saccades failed: their measures are empty[/red]")
         if self.out:
-            write_csv(self.out, rows)
+            from orient_eye.files import write_table
+
+            write_table(self.out, rows)
             say(f"in {self.out}")
         if self.command:
             _write_command(self.command, task.trajectory(start, action))
@@ -179,30 +181,9 @@ def saccade_rows(
     ]
 
 
-def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write rows of plain values as a table.
-
-    Raises:
-        InputError: it cannot be written there.
-    """
-    import csv
-    import io
-
-    from orient_eye.errors import InputError
-    from orient_eye.files import write_text
-
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    try:
-        write_text(path, text.getvalue())
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error}; name another file") from error
-
-
 def _write_command(path: Path, trajectory: Any) -> None:
     """The motor command of one saccade at the plant's step; its first row is the rest position."""
+    from orient_eye.files import write_table
     from orient_eye.trajectory import motor_column
 
     columns = {motor_column(name): trajectory.motor[0, :, i] for i, name in enumerate(trajectory.motor_names)}
@@ -211,7 +192,7 @@ def _write_command(path: Path, trajectory: Any) -> None:
         {"t_s": f"{t:.9g}", **{name: f"{columns[name][i]:.9g}" if name in columns else "0" for name in names}}
         for i, t in enumerate(trajectory.time)
     ]
-    write_csv(path, rows)
+    write_table(path, rows)
 
 
 def _table(rows: list[dict[str, Any]], task: "SaccadeTask") -> "Table":

@@ -104,7 +104,7 @@ def _steps_table(found: "Identification") -> "Table":
     from rich.table import Table
 
     table = Table(title="First order, each step by itself (± 95 %)")
-    for name in ("step", "motor", "K", "w0 [rad/s]", "rms [deg]", "R²"):
+    for name in ("step", "motor", "K", r"w0 \[rad/s]", r"rms \[deg]", "R²"):
         table.add_column(name, justify="left" if name == "step" else "right", no_wrap=name != "step")
     for step, (fit, *_) in zip(found.steps, found.fits, strict=True):
         numbers = (f"{step.amplitude_deg:.4g}", str(fit["K"]), str(fit["w0"]), f"{fit.rms_deg:.3f}")
@@ -116,7 +116,7 @@ def _models_table(found: "Identification") -> "Table":
     from rich.table import Table
 
     table = Table(title="All steps together, model by model", show_lines=True)
-    for name in ("model", "parameters (± 95 %)", "rms\n[deg]", "AICc", "held out\nrms [deg]"):
+    for name in ("model", "parameters (± 95 %)", "rms\n\\[deg]", "AICc", "held out\nrms \\[deg]"):
         table.add_column(name, justify="left" if name.startswith(("model", "par")) else "right")
     least = min(row.aicc for row in found.compared)
     best = found.preferred

@@ -68,7 +68,7 @@ class WeightsCommand:
         rows = [self._solve(plant, name, chosen, steps) for name in names]
         saccade = f"{self.start:g} to {self.target:g} deg with B = {self.B:g} 1/s"
         table = Table("case", title=f"{saccade}, plant {plant.name}, band {self.band:g}; lambda_e = 1")
-        for name in ("lambda_a", "lambda_d", "lambda_o", "D [deg]", "k0 [1/s]"):
+        for name in ("lambda_a", "lambda_d", "lambda_o", r"D \[deg]", "k0 [1/s]"):
             table.add_column(name, justify="right")
         for row in rows:
             weights = (f"{row[name]:.2e}".replace("e+0", "e") for name in ("accuracy", "duration", "overshoot"))

@@ -92,6 +92,29 @@ def evaluation_saccades(
     return both[:count], both[count:]
 
 
+def gap_summary(yardstick: Yardstick, action: Array, outcome: Outcome, gap: Array) -> dict[str, Any]:
+    """How far a policy's saccades are from the optimum, in plain values.
+
+    Args:
+        yardstick: the saccades.
+        action: what the policy chose, as `Yardstick.perform` returns it.
+        outcome: what came of it.
+        gap: the gaps.
+    """
+    large = np.abs(yardstick.target_yaw_deg - yardstick.start_yaw_deg) > 5
+    off = np.abs(action - yardstick.optimum.action)[large]
+    return {
+        "pairs": len(gap),
+        "gap_mean": float(gap.mean()),
+        "gap_p95": float(np.quantile(gap, 0.95)),
+        "gap_max": float(gap.max()),
+        "reward_mean": float(outcome.reward.total.mean()),
+        "distance_from_optimum_above_5_deg": dict(
+            zip(["B", "D", "k0"], off.mean(axis=(0, 1)).tolist() if large.any() else [None] * 3, strict=True)
+        ),
+    }
+
+
 def amplitude_table(yardstick: Yardstick, act: Act) -> list[dict[str, float]]:
     """One row a saccade: the learned action, the best one found, rewards, gap, and the measures."""
     action, outcome, gap = yardstick.perform(act)

@@ -1,7 +1,5 @@
 """What happens between two updates of a training run: progress, metrics, stages, checkpoints, a stop."""
 
-import csv
-import io
 import signal
 import time
 from pathlib import Path
@@ -15,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
 from orient_eye.environment import SaccadeVecEnv, observe, to_action
-from orient_eye.files import write_text
+from orient_eye.files import write_table
 from orient_eye.learning.checkpoint import save_checkpoint
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.sac import OneStepSAC
@@ -149,11 +147,7 @@ class TrainingLoop(BaseCallback):
         trajectory.save_npz(self.folder / "stages" / f"{round(100 * stage):03d}.npz")
 
     def _write_metrics(self) -> None:
-        text = io.StringIO()
-        writer = csv.DictWriter(text, self._FIELDS)
-        writer.writeheader()
-        writer.writerows(self.rows)
-        write_text(self.folder / "metrics.csv", text.getvalue())
+        write_table(self.folder / "metrics.csv", self.rows)
         self._tensorboard()
 
     def _tensorboard(self) -> None:

@@ -21,7 +21,7 @@ from orient_eye.environment import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.checkpoint import load_checkpoint
 from orient_eye.learning.config import TrainConfig
-from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluation_saccades
+from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluation_saccades, gap_summary
 from orient_eye.learning.loop import CHECKPOINT_S, CtrlC, Stop, TrainingLoop, progress_bar
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
@@ -213,23 +213,13 @@ class _Run:
         from orient_eye.learning.stages import record_stages
 
         policy = self.policy(model, {})
-        action, outcome, gap = yardstick.perform(policy.act)
-        large = np.abs(yardstick.target_yaw_deg - yardstick.start_yaw_deg) > 5
-        off = np.abs(action - yardstick.optimum.action)[large]
         result = {
             "out": str(self.run.path),
             "plant": self.config.plant,
             "updates": self.config.updates,
             "saccades": model.num_timesteps,
             "train_s": round(loop.elapsed, 1),
-            "pairs": len(gap),
-            "gap_mean": float(gap.mean()),
-            "gap_p95": float(np.quantile(gap, 0.95)),
-            "gap_max": float(gap.max()),
-            "reward_mean": float(outcome.reward.total.mean()),
-            "distance_from_optimum_above_5_deg": dict(
-                zip(["B", "D", "k0"], off.mean(axis=(0, 1)).tolist(), strict=True)
-            ),
+            **gap_summary(yardstick, *yardstick.perform(policy.act)),
             "failed_saccades": loop.failed,
             "table": amplitude_table(table, policy.act),
         }

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orient_eye.errors import InputError
-from orient_eye.rotations import FORWARD, rotation
+from orient_eye.rotations import FORWARD, angle_between, rotation
 
 Array = NDArray[np.float64]
 Torque = Callable[[Array, Array], Array]
@@ -16,20 +16,24 @@ Torque = Callable[[Array, Array], Array]
 _STEP = 1e-6  # rad, of the difference quotients
 _TOLERANCE = 1e-12  # N m; a degree is worth about 5e-3
 _ITERATIONS = 40
+_FAR_DEG = 60.0
 
 
 def rest_orientation(torque: Torque, motor: Array) -> Array:
-    """Orientations (n, 4) without torque at motor positions [deg] (n, motors).
+    """Orientations (n, 4) without torque at motor positions [deg] (n, motors); NaN where a position is none.
 
     Raises:
         InputError: no equilibrium was found from straight ahead.
     """
     motor = np.asarray(motor, dtype=float)
+    known = np.asarray(np.isfinite(motor).all(axis=1))
+    motor = np.where(known[:, None], motor, 0.0)
     # Along a path from zero, so that Newton's method stays on the branch the eye would follow.
     parts = max(1, int(np.ceil(np.abs(motor).max(initial=0.0) / 40.0)))
     orientation = np.tile(FORWARD, (len(motor), 1))
     for part in range(1, parts + 1):
         orientation = _newton_orientation(torque, motor * part / parts, orientation)
+    orientation[~known] = np.nan
     return orientation
 
 
@@ -72,13 +76,19 @@ def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int
             columns.append((torque(orientation, moved) - residual) / step)
         slope = np.stack(columns, axis=-1)
         normal = np.swapaxes(slope, -1, -2)
-        change = -np.linalg.solve(normal @ slope, normal @ residual[..., None])[..., 0]
+        square = normal @ slope + 1e-18 * np.eye(len(driven))  # a motor at its limit may pull on nothing
+        change = -np.linalg.solve(square, normal @ residual[..., None])[..., 0]
         motor[:, driven] = np.clip(motor[:, driven] + np.clip(change, -20, 20), *limit[driven].T)
         if np.abs(change).max(initial=0.0) < 1e-10:
             break
     residual = np.abs(torque(orientation, motor)).max(axis=-1, initial=0.0)
-    if (residual > 1e-7).any():
-        worst = int(residual.argmax())
+    bad = ~(residual < 1e-7)
+    # Far from straight ahead the torque also vanishes where the eye would never come to rest.
+    far = np.flatnonzero(~bad & (angle_between(orientation, FORWARD) > _FAR_DEG))
+    if far.size:
+        bad[far] = angle_between(rest_orientation(torque, motor[far]), orientation[far]) > 1e-4
+    if bad.any():
+        worst = int(bad.argmax())
         raise InputError(
             f"orientation {np.round(orientation[worst], 4).tolist()} (w, x, y, z) is no equilibrium of motors "
             f"{[i + 1 for i in driven]} within their range: choose one they can hold"

@@ -76,13 +76,13 @@ class LowPassPlant:
         return np.arange(samples) * np.float64(self.step_s)
 
     def _trajectory(self, t: Array, yaw: Array, rate: Array, motor: Array) -> Trajectory:
-        yaw, rate, motor = yaw.copy(), rate.copy(), motor.copy()
-        failed = np.asarray(~np.isfinite(yaw).all(axis=1))
-        for array in (yaw, rate, motor):
-            array[failed] = np.nan
+        motor = motor.copy()
+        failed = np.asarray(~(np.isfinite(yaw).all(axis=1) & np.isfinite(motor).all(axis=(1, 2))))
         velocity = np.stack([np.zeros_like(rate), np.zeros_like(rate), rate], axis=-1)
-        velocity[failed] = np.nan
-        return Trajectory(t, rotations.from_yaw(yaw), velocity, motor, None, failed, self.motors)
+        orientation = rotations.from_yaw(yaw)
+        for array in (orientation, velocity, motor):
+            array[failed] = np.nan
+        return Trajectory(t, orientation, velocity, motor, None, failed, self.motors)
 
     def rest_orientation(self, motor: Array) -> Array:
         """Orientations in which the eye rests; see `orient_eye.plants.Plant`."""

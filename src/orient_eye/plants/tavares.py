@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from orient_eye import eye as eyes
 from orient_eye.eye import STANDARD_GRAVITY, Elastics
 from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, check_command, check_start, equilibrium
-from orient_eye.rotations import rotation
+from orient_eye.rotations import FORWARD, rotation
 from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
@@ -23,6 +23,7 @@ STATIC_FRICTION = 0.006
 """N m, in the author's program, while the eye turns slower than `STATIC_SPEED`."""
 STATIC_SPEED = 1e-5
 """rad/s."""
+_DIVERGED = 1e4  # rad/s: a thousand times the fastest saccade
 
 
 class TavaresPlant:
@@ -95,6 +96,8 @@ class TavaresPlant:
         if start is None:
             start = EyeState(self.rest_orientation(motor[:, 0]))
         orientation, velocity = check_start(start, len(command))
+        finite &= np.isfinite(orientation).all(axis=1) & np.isfinite(velocity).all(axis=1)
+        orientation[~finite], velocity[~finite] = FORWARD, 0
         saccades, samples = command.shape[:2]
         out_q, out_w = np.empty((saccades, samples, 4)), np.empty((saccades, samples, 3))
         out_t = np.empty((saccades, samples, len(self.tendons)))
@@ -104,7 +107,10 @@ class TavaresPlant:
             torque, tension = self.elastic_torque(turn, motor[:, k])
             out_q[:, k], out_w[:, k], out_t[:, k] = q, np.rad2deg(omega), tension
             q, omega = self._advance(turn, q, omega, torque + self._gravity_torque(turn))
-        failed = ~finite | ~np.isfinite(out_q).all(axis=(1, 2))
+            gone = ~(np.abs(omega).max(axis=1) < _DIVERGED)
+            finite &= ~gone
+            q[gone], omega[gone] = FORWARD, 0
+        failed = ~finite
         for array in (out_q, out_w, out_t, motor):
             array[failed] = np.nan
         return Trajectory(
