@@ -90,7 +90,7 @@ def test_failed_saccades_get_the_worst_of_each_term() -> None:
         broken[name] = np.array([[1.0, 0, 0, 0], [np.nan] * 4])
     for energy in (np.nan, np.inf, 3e5):
         found = reward(measures(2, **broken), np.array([3e5, energy]), np.tile(FORWARD, (2, 1)), WEIGHTS)
-        assert (found.accuracy[1], found.duration[1], found.overshoot[1]) == (-1, -1, -1)
+        assert (found.accuracy[1], found.duration[1], found.overshoot[1]) == (-1, -1, -10)
         for value in vars(found).values():
             assert np.isfinite(value).all()
         spent = 3e5 if energy == 3e5 else 0.0

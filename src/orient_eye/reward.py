@@ -63,8 +63,8 @@ class Reward:
 def reward(measures: Measures, energy: Array, target: Array, weights: Weights) -> Reward:
     """Judge saccades.
 
-    A saccade that failed gets the worst value of each term but its energy: no accuracy, endless
-    duration, an overshoot of the whole amplitude.
+    A saccade that failed is worse than any that did not: no accuracy, endless duration, an overshoot of ten
+    amplitudes.
 
     Args:
         measures: of the saccades.
@@ -80,7 +80,7 @@ def reward(measures: Measures, energy: Array, target: Array, weights: Weights) -
     )
     accuracy = np.where(failed, -1.0, -(chord / 2) * (1 + np.abs(aligned)))
     duration = np.where(failed, -1.0, -(1 - 1 / (1 + DISCOUNT * measures.settling_time_s)))
-    overshoot = np.where(failed, -1.0, -measures.overshoot)
+    overshoot = np.where(failed, -10.0, -measures.overshoot)
     spent = -np.nan_to_num(np.asarray(energy, float), nan=0.0, posinf=0.0)
     total = (
         weights.accuracy * accuracy

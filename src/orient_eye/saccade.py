@@ -221,7 +221,7 @@ class SaccadeTask:
         motor[..., self.driven_index] = command.sample(self.plant.step_s, self._samples)
         low, high = self.plant.motor_range_deg.T
         held = np.clip(motor, low, high)
-        saturated = (held != motor).any(axis=(1, 2))
+        saturated = ((motor < low) | (motor > high)).any(axis=(1, 2))
         return self.plant.simulate(held, EyeState(start.orientation)), saturated
 
     def draw_yaw(self, count: int, random: np.random.Generator) -> tuple[Array, Array]:

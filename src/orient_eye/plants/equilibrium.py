@@ -29,10 +29,11 @@ def rest_orientation(torque: Torque, motor: Array) -> Array:
     known = np.asarray(np.isfinite(motor).all(axis=1))
     motor = np.where(known[:, None], motor, 0.0)
     # Along a path from zero, so that Newton's method stays on the branch the eye would follow.
-    parts = max(1, int(np.ceil(np.abs(motor).max(initial=0.0) / 40.0)))
+    far = np.abs(motor).max(axis=1, keepdims=True, initial=1e-9)
+    parts = max(1, int(np.ceil(far.max(initial=0.0) / 40.0)))
     orientation = np.tile(FORWARD, (len(motor), 1))
     for part in range(1, parts + 1):
-        orientation = _newton_orientation(torque, motor * part / parts, orientation)
+        orientation = _newton_orientation(torque, motor * np.minimum(1, 40.0 * part / far), orientation)
     orientation[~known] = np.nan
     return orientation
 
@@ -40,7 +41,8 @@ def rest_orientation(torque: Torque, motor: Array) -> Array:
 def _newton_orientation(torque: Torque, motor: Array, orientation: Array) -> Array:
     for _ in range(_ITERATIONS):
         residual = torque(orientation, motor)
-        if np.abs(residual).max(initial=0.0) < _TOLERANCE:
+        moving = np.abs(residual).max(axis=-1, initial=0.0) >= _TOLERANCE  # each row stops by itself
+        if not moving.any():
             return orientation
         columns = []
         for axis in np.eye(3):
@@ -49,7 +51,12 @@ def _newton_orientation(torque: Torque, motor: Array, orientation: Array) -> Arr
         change = -np.linalg.solve(np.stack(columns, axis=-1), residual[..., None])[..., 0]
         size = np.linalg.norm(change, axis=-1, keepdims=True)
         change *= np.minimum(1, 0.7 / np.maximum(size, 1e-300))
-        orientation = (Rotation.from_rotvec(change) * rotation(orientation)).as_quat(scalar_first=True)
+        change[~moving] = 0
+        orientation = np.where(
+            moving[:, None],
+            (Rotation.from_rotvec(change) * rotation(orientation)).as_quat(scalar_first=True),
+            orientation,
+        )
     if np.abs(residual).max() < 1e-9:  # as near as the difference quotients come
         return orientation
     worst = int(np.abs(residual).max(axis=-1).argmax())
