@@ -22,7 +22,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 demo: $(INSTALLED)
 	@if [ -e "$(DEMO)" ]; then echo "$(DEMO)/ is there already; move it away, or make demo DEMO=another-folder"; exit 2; fi
 	$(BIN)/orient-eye sysid --out $(DEMO)/sysid
-	$(BIN)/orient-eye train --surrogate $(DEMO)/sysid/surrogate.json --updates 8000 --evaluation-pairs 100 --out $(DEMO)/train
+	$(BIN)/orient-eye train --surrogate $(DEMO)/sysid/surrogate.json --evaluation-pairs 100 --out $(DEMO)/train
 	@echo
 	@echo "Look at:"
 	@echo "  $(DEMO)/sysid/figure_3_5.png    gain K and cut-off w0 of the eye against step amplitude"

@@ -21,6 +21,7 @@ import numpy as np
 import tyro
 
 from orient_eye.cases import CASES
+from orient_eye.learning.policy import Policy
 
 POLICIES = Path(__file__).resolve().parents[1] / "models" / "policies"
 
@@ -104,14 +105,13 @@ def table(folder: Path) -> str:
 
 
 def ship(folder: Path) -> None:
-    """Copy the policy with the smallest mean gap of each case."""
+    """Write the policy with the smallest mean gap of each case into models/policies."""
     for (plant, case), runs in results(folder).items():
         best = runs[int(np.argmin([run["gap_mean"] for run in runs]))]["folder"]
-        target = POLICIES / f"{plant}-{case}"
-        target.mkdir(parents=True, exist_ok=True)
-        for name in ("policy.npz", "policy.json"):
-            shutil.copyfile(best / name, target / name)
-        print(f"models/policies/{target.name}: from {best.name}", file=sys.stderr)
+        policy = Policy.load(best)
+        policy.manifest["result"].pop("out", None)  # a path of the machine it was trained on
+        policy.save(POLICIES / f"{plant}-{case}")
+        print(f"models/policies/{plant}-{case}: from {best.name}", file=sys.stderr)
 
 
 if __name__ == "__main__":

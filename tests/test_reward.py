@@ -94,7 +94,7 @@ def test_failed_saccades_get_the_worst_of_each_term() -> None:
         for value in vars(found).values():
             assert np.isfinite(value).all()
         spent = 3e5 if energy == 3e5 else 0.0
-        assert found.total[1] == pytest.approx(-(2.66e7 + 5.12e5 + 2.3e8) - spent, rel=1e-14)
+        assert found.total[1] == pytest.approx(-(2.66e7 + 5.12e5 + 2.3e9) - spent, rel=1e-14)
         assert found.total[0] == pytest.approx(-3e5 - 5.12e5 * (1 - 1 / 1.06) - 2.3e7, rel=1e-12)
 
 
