@@ -84,9 +84,8 @@ def main() -> None:
     torch.set_num_threads(1)
     products = matrix_products(options.batch, options.device)
     own = float(np.median(times["OneStepSAC, 1 critic, 1 torch thread (default)"]))
-    print(
-        f"{'the matrix products of one such update alone':48s} {1e3 * products:6.2f} ms: {100 * products / own:.0f} % of it"
-    )
+    name = "the matrix products of one such update alone"
+    print(f"{name:48s} {1e3 * products:6.2f} ms: {100 * products / own:.0f} % of it")
 
 
 def fill(model: SAC, env: SaccadeVecEnv) -> None:

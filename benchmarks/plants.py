@@ -58,15 +58,13 @@ def main() -> None:
     difference = np.abs(np.abs((trajectory.orientation[:, 1:] * states[..., 1:5]).sum(axis=-1)) - 1).max()
     ratio = np.array(bare_s) / np.array(ours_s)
     total = n * steps
-    print(
-        f"{n} saccades of {steps} steps, {threads} threads, {options.rounds} rounds; same orientations to {difference:.0e}"
-    )
+    print(f"{n} saccades of {steps} steps, {threads} threads, {options.rounds} rounds")
+    print(f"largest difference of the orientations' quaternions: {difference:.0e}")
     print(f"bare mujoco.rollout     {total / np.median(bare_s):10.0f} steps/s")
     print(f"plant 'mujoco'          {total / np.median(ours_s):10.0f} steps/s, with tensions")
     print(f"speed, plant over bare  median {np.median(ratio):.2f}, {ratio.min():.2f} to {ratio.max():.2f}")
-    print(
-        f"plant over the author's {AUTHOR_STEPS_PER_S} steps/s: {total / np.median(ours_s) / AUTHOR_STEPS_PER_S:.0f} times"
-    )
+    times = total / np.median(ours_s) / AUTHOR_STEPS_PER_S
+    print(f"plant over the author's {AUTHOR_STEPS_PER_S} steps/s: {times:.0f} times")
 
 
 if __name__ == "__main__":

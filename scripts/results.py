@@ -3,7 +3,7 @@
     python scripts/results.py runs/results                  # hours of one core; runs that are done are kept
     python scripts/results.py runs/results --plants lpf --cases 1 --seeds 0
 
-Every run is `orient-eye train` with its defaults. Prints the table of docs/results.md, and with --ship copies
+Every run is `orient-eye train` with its defaults. Prints the table of docs/learning.md, and with --ship copies
 the best run of each case into models/policies.
 """
 

@@ -45,7 +45,7 @@ class Export:
             if self.onnx:
                 say(f"in {export_onnx(policy, self.onnx)}")
             if self.sb3:
-                say(f"in {export_sb3(policy, self.sb3)}; loading it runs code: give it only to people who trust you")
+                say(f"in {export_sb3(policy, self.sb3)}; loading it runs code (pickle)")
         except OSError as error:
             raise InputError(f"cannot write there: {error}; name another file") from error
         written = {"onnx": self.onnx, "sb3": self.sb3}

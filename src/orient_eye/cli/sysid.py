@@ -122,7 +122,9 @@ def _models_table(found: "Identification") -> "Table":
     best = found.preferred
     for row in found.compared:
         parameters = "\n".join(
-            f"{e.parameter.name} = {e} {e.parameter.unit.removeprefix('deg/deg')}".rstrip() for e in row.fit.estimates
+            f"{e.parameter.name} = {e} {e.parameter.unit.removeprefix('deg/deg')}".rstrip()
+            + (" (at its bound)" if e.at_bound else "")
+            for e in row.fit.estimates
         )
         held_out = f"{row.held_out_rms_deg:.3f}" if row.held_out else "-"
         title = f"[bold]{row.fit.model.title}[/bold]\npreferred" if row is best else row.fit.model.title

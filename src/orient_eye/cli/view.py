@@ -19,8 +19,8 @@ class View:
     speed. Without a screen: --web serves it to a browser on this machine, --screenshot saves a picture.
 
     Examples:
-        orient-eye view runs/simulate-1/saccades.rrd
-        orient-eye view saccades.rrd --screenshot eye.png --at 0.05 --tab +20°
+        orient-eye view runs/first/trajectory.rrd
+        orient-eye view runs/first/trajectory.rrd --screenshot eye.png --at 0.05
     """
 
     file: Annotated[Path, tyro.conf.Positional]
