@@ -88,6 +88,7 @@ def test_validate_says_whether_it_passed() -> None:
         (["predict", "nosuch", "--start", "0", "--target", "5"], "nosuch"),
         (["view", "nosuch.rrd"], "nosuch.rrd"),
         (["sysid", "--recording", "nosuch.csv"], "nosuch.csv"),
+        (["sysid", "--recording", "nosuch.csv", "--amplitudes", "3"], "--amplitudes is for a plant"),
         (["optimum", "--start", "0", "--target", "500"], "500"),
         (["validate", "--random-runs", "-1"], "--random-runs"),
     ],

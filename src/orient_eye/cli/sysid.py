@@ -66,6 +66,10 @@ class Sysid:
         from orient_eye.sysid.report import write_report
 
         if self.recording:
+            default = Sysid()
+            for name in ("plant", "amplitudes", "held_out", "accurate"):
+                if getattr(self, name) != getattr(default, name):
+                    raise InputError(f"--{name.replace('_', '-')} is for a plant; leave it out beside --recording")
             steps = read_recordings(self.recording, self.motor, self.axis, self.row_times, self.until)
             found = identify_recordings(steps)
         else:
