@@ -391,7 +391,9 @@ GOOD: dict[str, Any] = {"format": "orient-eye surrogate 1", "K": 1.4, "w0": 17.0
 def test_files_that_are_no_surrogate_are_refused(tmp_path: Path, content: str) -> None:
     path = tmp_path / "surrogate.json"
     path.write_text(content, encoding="utf-8")
-    with pytest.raises(InputError, match=r"surrogate\.json is no surrogate \(.*orient-eye sysid.*shipped.*: mujoco, thesis"):
+    with pytest.raises(
+        InputError, match=r"surrogate\.json is no surrogate \(.*orient-eye sysid.*shipped.*: mujoco, thesis"
+    ):
         Surrogate.load(path)
 
 

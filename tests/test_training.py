@@ -140,7 +140,7 @@ def test_refusals_leave_nothing_behind(tiny: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "bad").exists()
 
 
-def test_trains_on_the_whole_eye(tmp_path: Path) -> None:
+def test_trains_on_the_whole_eye(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = TrainConfig(plant="mujoco", updates=3, saccades_per_update=4, warmup=8, batch_size=16, evaluation_pairs=1)
     # The search on this plant takes minutes: a short one stands in for it here.
     from orient_eye.learning import evaluation
@@ -152,11 +152,8 @@ def test_trains_on_the_whole_eye(tmp_path: Path) -> None:
             task, task.fixate(horizontal(start)), horizontal(target), random, population=12, generations=2
         )
 
-    original, evaluation.searched_optimum = evaluation.searched_optimum, short  # type: ignore[assignment]
-    try:
-        result = train(config, tmp_path / "run", quiet=True)
-    finally:
-        evaluation.searched_optimum = original
+    monkeypatch.setattr(evaluation, "searched_optimum", short)
+    result = train(config, tmp_path / "run", quiet=True)
     assert result["plant"] == "mujoco"
     manifest = json.loads((tmp_path / "run" / "policy.json").read_text())
     assert manifest["task"]["plant"] == make_plant("mujoco").identity()
