@@ -1,6 +1,7 @@
 """OneStepSAC: hand-written gradients against autograd, the replay buffer, and SB3's interface."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import torch
 from stable_baselines3.common.logger import Logger
 
 from orient_eye.environment import SaccadeVecEnv
-from orient_eye.learning.network import Network
+from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 from orient_eye.rotations import from_euler, rotation
@@ -41,27 +42,45 @@ def env() -> SaccadeVecEnv:
 
 def test_network_passes_are_those_of_autograd() -> None:
     torch.manual_seed(0)
-    for ends_in_relu in (False, True):
-        modules = [
-            torch.nn.Linear(5, 7),
-            torch.nn.ReLU(),
-            torch.nn.Linear(7, 4),
-            torch.nn.ReLU(),
-            torch.nn.Linear(4, 3),
-        ]
-        module = torch.nn.Sequential(*modules, *([torch.nn.ReLU()] if ends_in_relu else [])).double()
-        x = torch.randn(20, 5, dtype=torch.float64, requires_grad=True)
-        upstream = torch.randn(20, 3, dtype=torch.float64)
-        (module(x) * upstream).sum().backward()
-        expected = [p.grad.clone() for p in module.parameters() if p.grad is not None]
-        network = Network(module)
-        with torch.no_grad():
-            values = network.forward(x)
-            by_input = network.backward(values, upstream, of_parameters=True, of_input=True)
-        torch.testing.assert_close(values[-1], module(x))
-        torch.testing.assert_close(by_input, x.grad)
-        for ours, autograd in zip(module.parameters(), expected, strict=True):
-            torch.testing.assert_close(ours.grad, autograd)
+    layers = [torch.nn.Linear(5, 7), torch.nn.ReLU(), torch.nn.Linear(7, 4), torch.nn.ReLU(), torch.nn.Linear(4, 3)]
+    module = torch.nn.Sequential(*layers).double()
+    x = torch.randn(20, 5, dtype=torch.float64, requires_grad=True)
+    upstream = torch.randn(20, 3, dtype=torch.float64)
+    (module(x) * upstream).sum().backward()
+    expected = [p.grad.clone() for p in module.parameters() if p.grad is not None]
+    flatten(module.parameters())
+    network = Network(module)
+    with torch.no_grad():
+        values = network.forward(x)
+        by_input = network.backward(values, upstream, of_parameters=True, of_input=True)
+    torch.testing.assert_close(values[-1], module(x))
+    torch.testing.assert_close(by_input, x.grad)
+    for ours, autograd in zip(module.parameters(), expected, strict=True):
+        torch.testing.assert_close(ours.grad, autograd)
+
+
+def test_network_refuses_other_layers() -> None:
+    for modules in ([], [torch.nn.Linear(2, 2), torch.nn.Tanh(), torch.nn.Linear(2, 2)], [torch.nn.ReLU()]):
+        with pytest.raises(TypeError, match="ReLU between"):
+            Network(modules)
+
+
+@pytest.mark.parametrize("settings", [{"fused": True}, {"foreach": False}, {"amsgrad": True, "weight_decay": 0.1}])
+def test_step_of_a_flat_vector_is_that_of_torchs_adam(settings: dict[str, Any]) -> None:
+    torch.manual_seed(0)
+    flat, plain = torch.nn.Linear(5, 3), torch.nn.Linear(5, 3)
+    plain.load_state_dict(flat.state_dict())
+    ours = torch.optim.Adam([flatten(flat.parameters())], lr=0.01, **settings)
+    torchs = torch.optim.Adam(plain.parameters(), lr=0.01, **settings)
+    for _ in range(5):
+        for mine, other in zip(flat.parameters(), plain.parameters(), strict=True):
+            assert mine.grad is not None
+            other.grad = torch.randn_like(other)
+            mine.grad.copy_(other.grad)
+        take_step(ours)
+        torchs.step()
+    for mine, other in zip(flat.parameters(), plain.parameters(), strict=True):
+        torch.testing.assert_close(mine, other)
 
 
 @pytest.mark.parametrize("critics", [1, 2])

@@ -37,6 +37,7 @@ def save_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv, extra: 
         "temperature": _temperature(model),
         "rows": torch.from_numpy(buffer.rows[: buffer.size()]),
         "torch_random": torch.get_rng_state(),
+        "cuda_random": torch.cuda.get_rng_state_all() if model.device.type == "cuda" else [],
         "plain": json.dumps(
             {
                 "buffer_position": buffer.pos,
@@ -84,6 +85,8 @@ def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict
     model._last_obs = env.begin(*(np.array(yaw) for yaw in plain["env_yaw"]))
     env.random.bit_generator.state = plain["env_random"]
     torch.set_rng_state(content["torch_random"])
+    if model.device.type == "cuda":
+        torch.cuda.set_rng_state_all(content["cuda_random"])
     extra: dict[str, Any] = plain["extra"]
     return extra
 

@@ -1,37 +1,72 @@
 """Forward and backward passes of a small ReLU network, written out.
 
 The networks of a saccade policy are so small that autograd's bookkeeping costs more than their arithmetic.
-These passes read the parameters of ordinary torch layers and leave gradients in `.grad`, so that
-optimizers, checkpoints and SB3's own code see nothing unusual; a test holds them against autograd.
+These passes read the parameters of ordinary torch layers and write into their `.grad`, so that checkpoints
+and SB3's own code see nothing unusual; a test holds them against autograd. For the same reason the
+parameters of a network lie in one vector, which an optimizer moves in one call.
 """
 
 from collections.abc import Iterable
 
 import torch
 from torch import Tensor, nn
+from torch.optim.adam import adam
+
+
+def flatten(parameters: Iterable[nn.Parameter]) -> nn.Parameter:
+    """One vector of parameters: each of them, and its gradient, becomes a view of the vector.
+
+    Args:
+        parameters: all on one device, of one type.
+    """
+    parameters = list(parameters)
+    vector = nn.Parameter(torch.cat([parameter.detach().flatten() for parameter in parameters]))
+    vector.grad = torch.zeros_like(vector)
+    sizes = [parameter.numel() for parameter in parameters]
+    for parameter, data, gradient in zip(parameters, vector.data.split(sizes), vector.grad.split(sizes), strict=True):
+        parameter.data, parameter.grad = data.view_as(parameter), gradient.view_as(parameter)
+    return vector
+
+
+@torch.no_grad()
+def take_step(optimizer: torch.optim.Optimizer) -> None:
+    """The optimizer's step; of torch's Adam on one flat vector, without bookkeeping that outlasts the step."""
+    group = optimizer.param_groups[0]
+    vector = group["params"][0]
+    if type(optimizer) is not torch.optim.Adam or vector not in optimizer.state:  # the first step makes the state
+        optimizer.step()
+        return
+    state = optimizer.state[vector]
+    moments = [state["exp_avg"]], [state["exp_avg_sq"]], [state["max_exp_avg_sq"]] if group["amsgrad"] else []
+    beta1, beta2 = group["betas"]
+    names = ("lr", "weight_decay", "eps", "amsgrad", "maximize", "fused", "foreach")
+    settings = {name: group[name] for name in names}
+    adam([vector], [vector.grad], *moments, [state["step"]], beta1=beta1, beta2=beta2, **settings)
 
 
 class Network:
     """Linear layers with ReLU between them.
 
     Args:
-        modules: linear layers and ReLUs, in order.
+        modules: linear layers and ReLUs in turn, a linear layer last; their parameters have gradients to write
+            to (`flatten`).
     """
 
     def __init__(self, modules: Iterable[nn.Module]) -> None:
         modules = list(modules)
-        self.layers = [module for module in modules if isinstance(module, nn.Linear)]
-        self.ends_in_relu = isinstance(modules[-1], nn.ReLU)
-        if any(not isinstance(module, nn.Linear | nn.ReLU) for module in modules):
-            raise TypeError(f"only linear layers and ReLU, got {[type(module).__name__ for module in modules]}")
+        expected = [nn.ReLU if i % 2 else nn.Linear for i in range(len(modules) | 1)]
+        if [type(module) for module in modules] != expected:
+            names = [type(module).__name__ for module in modules]
+            raise TypeError(f"linear layers with ReLU between them, got {names}")
+        self.layers = [(layer.weight, layer.bias) for layer in modules if isinstance(layer, nn.Linear)]
 
     def forward(self, x: Tensor) -> list[Tensor]:
         """Input and output of every layer, (batch, size) each; the last is the network's output."""
         values = [x]
-        for i, layer in enumerate(self.layers):
-            x = torch.addmm(layer.bias, x, layer.weight.t())
-            if i + 1 < len(self.layers) or self.ends_in_relu:
+        for weight, bias in self.layers:
+            if len(values) > 1:
                 x.relu_()
+            x = nn.functional.linear(x, weight, bias)
             values.append(x)
         return values
 
@@ -41,19 +76,18 @@ class Network:
         Args:
             values: of the forward pass.
             gradient: by the output, (batch, outputs).
-            of_parameters: leave the parameters' gradients in `.grad`, in place of what is there.
+            of_parameters: write the parameters' gradients over what their `.grad` holds.
             of_input: go on to the input.
 
         Returns:
             The gradient by the input, or by the first layer's output where `of_input` is false.
         """
-        for i in reversed(range(len(self.layers))):
-            layer = self.layers[i]
-            if i + 1 < len(self.layers) or self.ends_in_relu:
-                gradient = torch.ops.aten.threshold_backward(gradient, values[i + 1], 0)
+        for i, (weight, bias) in reversed(list(enumerate(self.layers))):
+            if i + 1 < len(self.layers):
+                torch.ops.aten.threshold_backward.grad_input(gradient, values[i + 1], 0, grad_input=gradient)
             if of_parameters:
-                layer.weight.grad = gradient.t() @ values[i]
-                layer.bias.grad = gradient.sum(dim=0)
+                torch.mm(gradient.t(), values[i], out=weight.grad)
+                torch.sum(gradient, dim=0, out=bias.grad)
             if i or of_input:
-                gradient = gradient @ layer.weight
+                gradient = gradient @ weight
         return gradient

@@ -75,7 +75,8 @@ class OneStepReplayBuffer(ReplayBuffer):
 
     def sample(self, batch_size: int, env: VecNormalize | None = None) -> ReplayBufferSamples:
         """Saccades drawn uniformly, with replacement."""
-        rows = torch.from_numpy(self.rows[self.random.integers(self.size(), size=batch_size)]).to(self.device)
+        drawn = self.random.integers(self.size(), size=batch_size)
+        rows = torch.from_numpy(self.rows.take(drawn, axis=0)).to(self.device)
         observations = rows[:, : self.observation_size]
         actions = rows[:, self.observation_size : -1]
         rewards = rows[:, -1:]

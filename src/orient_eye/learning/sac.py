@@ -5,6 +5,7 @@ second pass of the policy, two networks in the end, as the thesis has it (4.1). 
 interface: `predict`, `save`, `load`, `learn`, callbacks, loggers.
 """
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, cast
@@ -14,9 +15,9 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
-from torch import Tensor
+from torch import Tensor, nn
 
-from orient_eye.learning.network import Network
+from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.saccade import YAW_RANGE_DEG
 
 Schedule = Callable[[float], float]
@@ -37,16 +38,15 @@ class GazeFeatures(BaseFeaturesExtractor):
 
     def forward(self, observations: Tensor) -> Tensor:
         """Features (batch, 6) of observations (batch, 8)."""
-        a, b = observations[:, :4], observations[:, 4:]
-        aw, av, bw, bv = a[:, :1], a[:, 1:], b[:, :1], b[:, 1:]
-        turn_w = aw * bw + (av * bv).sum(dim=1, keepdim=True)  # turn = b a^-1
+        a, b = observations.split(4, dim=1)
+        (aw, av), (bw, bv) = a.split((1, 3), dim=1), b.split((1, 3), dim=1)
+        turn_w = (a * b).sum(dim=1, keepdim=True)  # turn = b a^-1
         turn_v = aw * bv - bw * av + torch.linalg.cross(av, bv)
         # Rotation vectors of both at once: angle times axis.
         w, v = torch.stack([aw, turn_w], dim=1), torch.stack([av, turn_v], dim=1)
-        size = torch.linalg.vector_norm(v, dim=2, keepdim=True)
-        angle = 2 * torch.atan2(size, w.abs()) * torch.sign(w)
-        stretch = torch.where(size > 1e-7, angle / size.clamp_min(1e-7), 2.0)
-        return (v * stretch).flatten(1) / _GAZE_RANGE_RAD
+        size = torch.linalg.vector_norm(v, dim=2, keepdim=True).clamp_min(1e-7)
+        half_angle = torch.atan2(size, w.abs()) * torch.sign(w)
+        return (v * (half_angle / size)).flatten(1) * (2 / _GAZE_RANGE_RAD)
 
 
 def falling_temperature(first: float = 1.0, last: float = 1e-3, until: float = 0.8) -> Schedule:
@@ -77,8 +77,20 @@ class OneStepSAC(SAC):
 
     def _create_aliases(self) -> None:
         super()._create_aliases()
-        heads = (self.actor.mu, cast(torch.nn.Linear, self.actor.log_std))
-        self._policy = (Network(cast(Any, self.actor.latent_pi)), Network([heads[0]]), Network([heads[1]]))
+        heads = cast(nn.Linear, self.actor.mu), cast(nn.Linear, self.actor.log_std)
+        head = nn.Linear(heads[0].in_features, 2 * heads[0].out_features, device=self.device)
+        for name in ("weight", "bias"):
+            getattr(head, name).data = torch.cat([getattr(layer, name).data for layer in heads])
+        policy = nn.Sequential(*self.actor.latent_pi, head)
+        for part, parameters in ((self.actor, policy.parameters()), (self.critic, self.critic.parameters())):
+            settings = {"lr": self.lr_schedule(1), **self.policy.optimizer_kwargs}
+            part.optimizer = self.policy.optimizer_class([flatten(parameters)], **settings)
+        for name in ("weight", "bias"):  # SB3's two heads are views of the halves of the one
+            both = getattr(head, name)
+            for layer, data, gradient in zip(heads, both.data.chunk(2), both.grad.chunk(2), strict=True):
+                getattr(layer, name).data, getattr(layer, name).grad = data, gradient
+        self._policy = Network(policy)
+        self._one = torch.tensor(1 + 1e-6, device=self.device)
         self._q = [Network(cast(Any, q)) for q in self.critic.q_networks]
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
@@ -88,22 +100,25 @@ class OneStepSAC(SAC):
             optimizers.append(self.ent_coef_optimizer)
         self._update_learning_rate(optimizers)
         if self.temperature is not None:
-            self.ent_coef_tensor = torch.tensor(self.temperature(self._current_progress_remaining), device=self.device)
-        q_losses, policy_losses = [], []
+            self.ent_coef_tensor.fill_(self.temperature(self._current_progress_remaining))
+        q_loss = policy_loss = torch.zeros((), device=self.device)
+        # Moments of silent units fade into denormal numbers, at which a processor is many times slower.
+        torch.set_flush_denormal(True)
         for _ in range(gradient_steps):
             assert self.replay_buffer is not None
             data = self.replay_buffer.sample(batch_size)
             with torch.no_grad():
                 features = self.actor.extract_features(data.observations, self.actor.features_extractor)
-                q_losses.append(self._update_q(features, data.actions, data.rewards))
-                policy_loss, temperature = self._update_policy(features)
-                policy_losses.append(policy_loss)
+                q_loss = q_loss + self._update_q(features, data.actions, data.rewards)
+                loss, temperature = self._update_policy(features)
+                policy_loss = policy_loss + loss
+        torch.set_flush_denormal(False)
 
         self._n_updates += gradient_steps
         self.logger.record("train/n_updates", self._n_updates, exclude="tensorboard")
         self.logger.record("train/ent_coef", float(temperature))
-        self.logger.record("train/actor_loss", float(torch.stack(policy_losses).mean()))
-        self.logger.record("train/critic_loss", float(torch.stack(q_losses).mean()))
+        self.logger.record("train/actor_loss", float(policy_loss) / gradient_steps)
+        self.logger.record("train/critic_loss", float(q_loss) / gradient_steps)
 
     def _update_q(self, features: Tensor, actions: Tensor, rewards: Tensor) -> Tensor:
         """One step of Q towards the reward, which is the whole return; returns the mean squared error."""
@@ -111,10 +126,10 @@ class OneStepSAC(SAC):
         loss = torch.zeros((), device=self.device)
         for q in self._q:
             values = q.forward(known)
+            loss = loss + torch.nn.functional.mse_loss(values[-1], rewards)
             error = values[-1] - rewards
-            q.backward(values, error * (2 / len(error)), of_parameters=True, of_input=False)
-            loss = loss + (error**2).mean()
-        self.critic.optimizer.step()
+            q.backward(values, error.mul_(2 / len(error)), of_parameters=True, of_input=False)
+        take_step(self.critic.optimizer)
         return loss
 
     def _update_policy(self, features: Tensor) -> tuple[Tensor, Tensor]:
@@ -122,46 +137,42 @@ class OneStepSAC(SAC):
 
         Actions are a = tanh(u), u = mean + std * noise, with the density of the squashed Gaussian.
         """
-        trunk, mean, log_std_head = self._policy
-        latent = trunk.forward(features)
-        raw = log_std_head.forward(latent[-1])
-        means = mean.forward(latent[-1])
-        log_std = raw[-1].clamp(LOG_STD_MIN, LOG_STD_MAX)
+        outputs = self._policy.forward(features)
+        mean, raw = outputs[-1].chunk(2, dim=1)
+        log_std = raw.clamp(LOG_STD_MIN, LOG_STD_MAX)
         noise = torch.randn_like(log_std)
-        spread = log_std.exp() * noise
-        actions = torch.tanh(means[-1] + spread)
-        slope = 1 - actions**2
-        soft = slope + 1e-6  # as SB3 has it
-        log_density = (-0.5 * noise**2 - log_std - _HALF_LOG_2_PI - soft.log()).sum(dim=1)
-        temperature = self._temperature_step(log_density)
+        spread = log_std.exp().mul_(noise)
+        actions = (mean + spread).tanh_()
+        n, size = actions.shape
+        slope = torch.addcmul(self._one, actions, actions, value=-1)  # 1 - a^2, kept off zero as SB3 does
+        entropy = torch.addcmul(log_std, noise, noise, value=0.5).add_(slope.log()).sum() / n + size * _HALF_LOG_2_PI
+        temperature = self._temperature_step(entropy)
 
         drawn = torch.cat([features, actions], dim=1)
         passes = [q.forward(drawn) for q in self._q]
-        values = torch.cat([v[-1] for v in passes], dim=1)
-        worst = values.argmin(dim=1, keepdim=True)
-        by_action = torch.zeros_like(actions)
-        for i, (q, v) in enumerate(zip(self._q, passes, strict=True)):
-            counts = (worst == i).to(actions.dtype)
-            by_action += q.backward(v, counts, of_parameters=False, of_input=True)[:, features.shape[1] :]
-        n = len(actions)
-        by_u = (temperature * 2 * actions / soft - by_action) * slope / n
-        unclamped = (raw[-1] > LOG_STD_MIN) & (raw[-1] < LOG_STD_MAX)
-        by_log_std = (by_u * spread - temperature / n) * unclamped
-        by_latent = mean.backward(means, by_u, of_parameters=True, of_input=True)
-        by_latent = by_latent + log_std_head.backward(raw, by_log_std, of_parameters=True, of_input=True)
-        trunk.backward(latent, by_latent, of_parameters=True, of_input=False)
-        self.actor.optimizer.step()
-        return (temperature * log_density - values.amin(dim=1)).mean(), temperature
+        value, worst = torch.cat([v[-1] for v in passes], dim=1).min(dim=1, keepdim=True)
+        by_drawn = [
+            q.backward(v, (worst == i) * (-1 / n), of_parameters=False, of_input=True)
+            for i, (q, v) in enumerate(zip(self._q, passes, strict=True))
+        ]
+        by_action = functools.reduce(torch.add, by_drawn)[:, -size:]
+        pull = temperature / n
+        by_u = torch.ops.aten.tanh_backward((actions / slope).mul_(2 * pull).add_(by_action), actions)
+        by_log_std = (by_u * spread).sub_(pull).mul_(raw == log_std)  # nothing where it was clamped
+        by_outputs = torch.cat([by_u, by_log_std], dim=1)
+        self._policy.backward(outputs, by_outputs, of_parameters=True, of_input=False)
+        take_step(self.actor.optimizer)
+        return -(temperature * entropy + value.sum() / n), temperature
 
-    def _temperature_step(self, log_probability: Tensor) -> Tensor:
+    def _temperature_step(self, entropy: Tensor) -> Tensor:
         """The temperature of this update; under SB3's automatic rule it learns first."""
         if self.ent_coef_optimizer is None or self.log_ent_coef is None:
             return self.ent_coef_tensor
         temperature = self.log_ent_coef.detach().exp()
         assert isinstance(self.target_entropy, float)
-        self.log_ent_coef.grad = -(log_probability + self.target_entropy).mean().reshape(1)
+        self.log_ent_coef.grad = (entropy - self.target_entropy).reshape(1)
         self.ent_coef_optimizer.step()
         return temperature
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "_policy", "_q"]
+        return [*super()._excluded_save_params(), "_policy", "_q", "_one"]
