@@ -16,6 +16,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 from stable_baselines3.common.vec_env import VecMonitor
 
 import orient_eye
+from orient_eye.cases import CASES
 from orient_eye.environment import SaccadeEnv, SaccadeVecEnv, log_reward, observe, to_action, to_scaled
 from orient_eye.errors import InputError
 from orient_eye.plants import PLANTS, make_plant
@@ -178,6 +179,9 @@ def test_plant_and_task_options_arrive() -> None:
     env = SaccadeEnv("mujoco", plant_options={"eye": "eve_v3", "threads": 1}, variant=2, C=50.0, horizon_s=0.3)
     assert env.task.plant.identity()["eye"] == "eve_v3"
     assert (env.task.variant, env.task.C, env.task.horizon_s) == (2, 50.0, 0.3)
+    by_case = SaccadeEnv("lpf", case="2-varying").task
+    assert (by_case.variant, by_case.onset, by_case.weights.accuracy) == (2, "varying", 8.70e7)
+    assert SaccadeEnv("mujoco").task.weights == CASES["1"].weights("mujoco")  # solved on that plant
     three = SaccadeEnv("mujoco", driven=("motor1", "motor2", "motor3"))
     assert three.action_space.shape == (9,)
     plant = LowPassPlant(Surrogate(1.0, 10.0))

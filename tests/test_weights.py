@@ -84,9 +84,16 @@ def test_thesis_prints_the_weights_of_the_narrow_band(case: str) -> None:
 def test_shipped_weights_are_solutions(case: str) -> None:
     """With K D = 30 deg exactly; lambda_o of variant 1 is the thesis' printed one."""
     found = solve_weights(lpf_task(case), ChosenSaccade(D=30 / 1.4758))
-    shipped = CASES[case].weights
+    shipped = CASES[case].weights("lpf")
     assert (shipped.accuracy, shipped.duration) == pytest.approx((found.accuracy, found.duration), rel=0.005)
     assert shipped.overshoot == pytest.approx(found.overshoot, rel=0.11 if case == "1" else 0.005)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_shipped_weights_of_the_whole_eye_are_solutions(case: str) -> None:
+    found = solve_weights(SaccadeTask.of_case(MujocoPlant(), case))
+    assert three(CASES[case].weights("mujoco")) == pytest.approx(three(found), rel=0.005)
+    assert SaccadeTask.of_case(MujocoPlant(), case).weights == CASES[case].weights("mujoco")
 
 
 def terms_by_sampling(case: str, actions: Array, band: float) -> Array:

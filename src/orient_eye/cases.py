@@ -1,7 +1,8 @@
 """The five learning cases of the thesis (its Chapter 5): a pulse, its C, and the weights of the reward.
 
-The weights make B = 35, k0 = 17.5 and K D = 30 deg the optimal saccade from 0 to 30 deg on the thesis'
-low-pass plant with a settling band of 1 %; `orient-eye weights` solves them again.
+The weights make a saccade from 0 to 30 deg with B = 35 optimal, settling band 1 %: on the thesis' low-pass
+plant with k0 = 17.5 and K D = 30 deg, on the whole eye with the D that rests at 30 deg and the k0 below which
+it overshoots. `orient-eye weights` and `orient-eye weights --plant mujoco` solve them again.
 """
 
 from dataclasses import dataclass
@@ -19,22 +20,26 @@ class Case:
         variant: of the pulse (thesis 4.3).
         C: onset rate [1/s], "varying" for the one that brings the motor to its speed limit, None in
             variant 1.
-        weights: of the reward.
-        section: of the thesis that has its results.
+        lpf_weights: of the reward, on the low-pass plant.
+        eye_weights: of the reward, on the MuJoCo eye and the NumPy reference.
     """
 
     variant: int
     C: float | str | None
-    weights: Weights
-    section: str
+    lpf_weights: Weights
+    eye_weights: Weights
+
+    def weights(self, plant: str) -> Weights:
+        """Of the reward, on the plant of that name."""
+        return self.lpf_weights if plant == "lpf" else self.eye_weights
 
 
-CASES: dict[str, Case] = {
-    "1": Case(1, None, Weights(), "5.1"),
-    "2-fixed": Case(2, FIXED_C[2], Weights(accuracy=1.21e8, duration=2.48e6, overshoot=3.51e8), "5.2.1"),
-    "2-varying": Case(2, "varying", Weights(accuracy=8.70e7, duration=1.36e6, overshoot=1.76e8), "5.2.2"),
-    "3-fixed": Case(3, FIXED_C[3], Weights(accuracy=1.07e7, duration=1.52e5, overshoot=6.91e7), "5.3.1"),
-    "3-varying": Case(3, "varying", Weights(accuracy=1.07e7, duration=1.52e5, overshoot=7.10e7), "5.3.2"),
+CASES: dict[str, Case] = {  # Chapter 5: sections 5.1, 5.2.1, 5.2.2, 5.3.1, 5.3.2
+    "1": Case(1, None, Weights(), Weights(4.08e7, 1.0, 5.53e5, 5.51e7)),
+    "2-fixed": Case(2, FIXED_C[2], Weights(1.21e8, 1.0, 2.48e6, 3.51e8), Weights(2.30e8, 1.0, 2.79e6, 1.50e8)),
+    "2-varying": Case(2, "varying", Weights(8.70e7, 1.0, 1.36e6, 1.76e8), Weights(1.37e8, 1.0, 1.39e6, 6.86e7)),
+    "3-fixed": Case(3, FIXED_C[3], Weights(1.07e7, 1.0, 1.52e5, 6.91e7), Weights(1.35e7, 1.0, 1.67e5, 1.50e7)),
+    "3-varying": Case(3, "varying", Weights(1.07e7, 1.0, 1.52e5, 7.10e7), Weights(1.37e7, 1.0, 1.70e5, 1.52e7)),
 }
 
 

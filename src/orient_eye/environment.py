@@ -65,7 +65,7 @@ def _task(
         plant = make_plant(plant, **(plant_options or {}))
     elif plant_options:
         raise InputError("plant_options go with a plant's name; this plant is made already")
-    return SaccadeTask(plant, **task_options)
+    return SaccadeTask.of_case(plant, **{"case": "1", **task_options})
 
 
 class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -101,7 +101,8 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         plant: a name of `orient_eye.plants.PLANTS`, a plant, or a whole task.
         plant_options: keywords of that plant.
         log_reward: give the log reward.
-        task_options: keywords of `SaccadeTask`: driven, variant, C, weights, band, horizon_s.
+        task_options: the case, a name of `orient_eye.cases.CASES` ("1" unless given), and keywords of
+            `SaccadeTask` that differ from it: driven, variant, C, weights, speed_limit, band, horizon_s.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012  # gymnasium's own form
@@ -198,7 +199,7 @@ class SaccadeVecEnv(VecEnv):
         plant_options: keywords of that plant.
         log_reward: give the log reward.
         seed: of starts and targets.
-        task_options: keywords of `SaccadeTask`.
+        task_options: as in `SaccadeEnv`.
     """
 
     def __init__(

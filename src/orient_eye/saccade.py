@@ -117,7 +117,8 @@ class SaccadeTask:
         from orient_eye.cases import get_case
 
         chosen = get_case(case)
-        return cls(plant, **{"variant": chosen.variant, "C": chosen.C, "weights": chosen.weights, **options})
+        of_case = {"variant": chosen.variant, "C": chosen.C, "weights": chosen.weights(plant.name)}
+        return cls(plant, **{**of_case, **options})
 
     def identity(self) -> dict[str, Any]:
         """Everything that decides what an action is worth, in plain values: for manifests and caches."""

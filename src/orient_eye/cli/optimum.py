@@ -80,7 +80,7 @@ class OptimumCommand:
         task = SaccadeTask.of_case(
             chosen_plant(self.plant, self.surrogate, self.eye),
             self.case,
-            weights=Weights(*self.weights) if self.weights else get_case(self.case).weights,
+            weights=Weights(*self.weights) if self.weights else get_case(self.case).weights(self.plant),
             band=self.band,
             speed_limit=self.speed_limit,
         )

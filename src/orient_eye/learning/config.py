@@ -52,7 +52,7 @@ class TrainConfig:
     """Pulse of the motor command and its onset rate C: one of the thesis' five cases (4.3, 5.1 to 5.3)."""
     speed_limit: float = 7200.0
     """Motor speed to which a varying C brings the command, deg/s."""
-    weights: Annotated[tuple[float, float, float, float] | None, _default("those of the case")] = None
+    weights: Annotated[tuple[float, float, float, float] | None, _default("those of the case on the plant")] = None
     """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32; orient-eye weights)."""
     band: float = 0.01
     """Settling band, share of the amplitude."""
@@ -93,7 +93,7 @@ class TrainConfig:
         from orient_eye.cases import get_case  # the physics, which --help does not wait for
 
         closed_form = self.plant == "lpf"
-        weights = get_case(self.case).weights
+        weights = get_case(self.case).weights(self.plant)
         defaults = {
             "saccades_per_update": 128 if closed_form else 32,
             **_PRESETS[self.preset],
