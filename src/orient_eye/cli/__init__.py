@@ -9,6 +9,7 @@ inside `run`, so that `orient-eye --help` answers at once.
 import inspect
 import json
 import operator
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any, Protocol, Union, cast
@@ -71,12 +72,20 @@ def _summary(command: type, *, full: bool) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point of `orient-eye`; exits with 2 on bad input, 130 when interrupted."""
+    try:
+        _run(list(sys.argv[1:] if arguments is None else arguments))
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read our output, `head` say, has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def _run(arguments: list[str]) -> None:
     import tyro
     from rich.markup import escape
 
     from orient_eye.run_directory import plain
 
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
     as_json = "--json" in arguments
     if "--version" in arguments:
         from orient_eye import __version__

@@ -137,7 +137,7 @@ def _draw(policy: "Policy", pairs: "Yardstick", table: "Yardstick", folder: Path
 def _record(policy: "Policy", table: "Yardstick", path: Path) -> None:
     """The table's saccades, the searched optimum beside them."""
     from orient_eye.eye import build_model
-    from orient_eye.learning.policy import plant_in_words
+    from orient_eye.plants import plant_in_words
     from orient_eye.recording import record
 
     task = table.task

@@ -25,7 +25,7 @@ class Models:
         policies = [_policy(name, folder) for name, folder in shipped_policies().items()]
         surrogates = [_surrogate(file.stem) for file in sorted(data_folder("models").glob("surrogates/*.json"))]
         table = Table("policy", "case", "plant", title="policies")
-        for name in ("updates", "mean gap", "95th percentile", "k0 at 30 deg"):
+        for name in ("updates", "mean gap", "95th percentile", "k0 at 30 deg", "best k0"):
             table.add_column(name, justify="right")
         for row in policies:
             table.add_row(*(_text(row, key) for key in ("name", "case", "plant_in_words", "updates")), *_gaps(row))
@@ -42,7 +42,8 @@ class Models:
 
 def _policy(name: str, folder: "Path") -> dict[str, Any]:
     from orient_eye.errors import InputError
-    from orient_eye.learning.policy import Policy, plant_in_words
+    from orient_eye.learning.policy import Policy
+    from orient_eye.plants import plant_in_words
 
     try:
         manifest = Policy.load(folder).manifest
@@ -77,5 +78,5 @@ def _text(row: dict[str, Any], key: str) -> str:
 def _gaps(row: dict[str, Any]) -> list[str]:
     """Mean gap, its 95th percentile, and k0 of the 30 deg saccade beside the optimum's."""
     gaps = [row.get("gap_mean"), row.get("gap_p95")]
-    at_30 = [f"{r['k0']:.2f} | {r['k0_best']:.2f}" for r in row.get("table") or [] if r["amplitude_deg"] == 30]
-    return [*("" if gap is None else f"{100 * gap:.2f} %" for gap in gaps), *at_30[:1]]
+    at_30 = [(f"{r['k0']:.2f}", f"{r['k0_best']:.2f}") for r in row.get("table") or [] if r["amplitude_deg"] == 30]
+    return [*("" if gap is None else f"{100 * gap:.2f} %" for gap in gaps), *(at_30[0] if at_30 else ())]

@@ -199,7 +199,7 @@ def _table(rows: list[dict[str, Any]], task: "SaccadeTask") -> "Table":
     from rich.markup import escape
     from rich.table import Table
 
-    from orient_eye.learning.policy import plant_in_words
+    from orient_eye.plants import plant_in_words
 
     units = {"F": "deg", "B": "1/s", "D": "deg", "k0": "1/s", "C": "1/s"}
     keys = [key for key in rows[0] if key.split("_")[0] in units and rows[0][key] is not None]

@@ -56,6 +56,8 @@ class View:
         return result
 
     def _check(self) -> None:
+        if self.file.is_dir():
+            raise InputError(f"{self.file} is a folder; name the recording in it, NAME.rrd")
         if not self.file.is_file():
             raise InputError(f"{self.file} does not exist; `orient-eye simulate` writes recordings, NAME.rrd")
         with self.file.open("rb") as file:

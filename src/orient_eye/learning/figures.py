@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from orient_eye.figures import save
 from orient_eye.learning.evaluation import Yardstick
-from orient_eye.learning.policy import Policy, plant_in_words
+from orient_eye.learning.policy import Policy
+from orient_eye.plants import plant_in_words
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.pulse_step import PulseStep
 from orient_eye.resources import data_folder

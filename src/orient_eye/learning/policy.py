@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically, write_text
-from orient_eye.plants import Plant, make_plant
+from orient_eye.plants import Plant, make_plant, plant_in_words, value_in_words
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.pulse_step import SPEED_LIMIT
 from orient_eye.resources import data_folder
@@ -238,30 +238,10 @@ def _differences(trained: dict[str, Any], here: dict[str, Any]) -> list[str]:
     for key in dict.fromkeys((*one, *two)):
         follows = other_plant and key in ("horizon_s", "low", "high")
         if one.get(key) != two.get(key) and not follows:
-            words.append(f"{_WORDS.get(key, key)} {_short(one.get(key))}, not {_short(two.get(key))}")
+            words.append(f"{_WORDS.get(key, key)} {value_in_words(one.get(key))}, not {value_in_words(two.get(key))}")
             if key == "model":
                 words[-1] += " (the MJCF changed, or MuJoCo's version)"
     return words
-
-
-def plant_in_words(identity: dict[str, Any]) -> str:
-    """A plant's identity for people: "lpf (K = 1.4758, w0 = 17.5)"."""
-    options = {key: value for key, value in identity.items() if key not in ("plant", "model", "motor")}
-    words = [
-        str(value) if key == "eye" else f"{key} = {_short(value)}"
-        for key, value in options.items()
-        if value is not False
-    ]
-    return f"{identity.get('plant')} ({', '.join(words)})"
-
-
-def _short(value: Any) -> str:
-    """A plain value for people."""
-    if isinstance(value, dict):
-        return ", ".join(f"{key} = {_short(item)}" for key, item in value.items())
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(_short, value)) + "]"
-    return "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _plant(identity: dict[str, Any]) -> Plant:

@@ -112,6 +112,26 @@ def make_plant(name: str, **options: Any) -> Plant:
     return PLANTS[name](**options)
 
 
+def plant_in_words(identity: dict[str, Any]) -> str:
+    """A plant's identity for people: "lpf (K = 1.4758, w0 = 17.5)"."""
+    options = {key: value for key, value in identity.items() if key not in ("plant", "model", "motor")}
+    words = [
+        str(value) if key == "eye" else f"{key} = {value_in_words(value)}"
+        for key, value in options.items()
+        if value is not False
+    ]
+    return f"{identity.get('plant')} ({', '.join(words)})"
+
+
+def value_in_words(value: Any) -> str:
+    """A plain value for people."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key} = {value_in_words(item)}" for key, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(value_in_words, value)) + "]"
+    return "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
 def check_command(plant: Plant, command: Any) -> Array:
     """The command as float64 (saccades, time, motors) inside the plant's mechanical range.
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import stats
 
 from orient_eye.errors import InputError
-from orient_eye.plants import Plant
+from orient_eye.plants import Plant, plant_in_words
 from orient_eye.surrogate import Surrogate
 from orient_eye.sysid.comparison import Compared, HeldOut, compare, predict, preferred
 from orient_eye.sysid.fit import CONFIDENCE, Fit, fit_model
@@ -103,10 +103,10 @@ def identify_plant(
     if abs(abs(A[nearest]) - REFERENCE_DEG) > 0.5:
         warnings.append(f"w0 of the surrogate is that at {A[nearest]:g} deg, the step nearest to {REFERENCE_DEG:g}")
     source = (
-        f"steps of {motor} to {_listed(A)} deg on {plant.identity()}; K: least squares over all amplitudes, "
-        f"w0: at {A[nearest]:g} deg"
+        f"steps of {motor} to {_listed(A)} deg on {plant_in_words(plant.identity())}; "
+        f"K: least squares over all amplitudes, w0: at {A[nearest]:g} deg"
     )
-    number = Surrogate(gain, w0.value, motor, source)
+    number = Surrogate(gain, w0.value, motor, source, {"plant": plant.identity()})
     held_out_fit = tuple(
         predict(s.name, MODELS["first_order"].response(np.array([number.K, number.w0]), s), s) for s in judges
     )

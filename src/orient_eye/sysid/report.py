@@ -35,7 +35,8 @@ def write_report(found: Identification, folder: Path) -> dict[str, Any]:
         The result as plain values, with the names of the files.
     """
     result = summary(found)
-    details = {key: result[key] for key in ("K_interval", "w0_interval", "steps", "models", "held_out", "warnings")}
+    told = ("K_interval", "w0_interval", "steps", "models", "held_out", "warnings")
+    details = {**found.surrogate.details, **{key: result[key] for key in told}}
     details["data"] = [s.source for s in found.steps if s.source]
     replace(found.surrogate, details=details).save(folder / "surrogate.json")
     entries = list(_entries(found))
