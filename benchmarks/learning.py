@@ -2,13 +2,15 @@
 
     python benchmarks/learning.py [--device cuda]
 
-Same environment, networks 128-128-32, batch 512, a full replay buffer; blocks of updates in turn. The last
-line is the time of the matrix products alone that one update of ours needs.
+Same environment, networks 128-128-32, batch 512, a replay buffer of 8192 saccades; blocks of updates in
+turn. The last line is the time of the matrix products alone that one update of ours needs. On another device
+than the CPU, the CPU competes too. Threads of torch wait badly: measure on a machine with nothing else to do.
 """
 
 import argparse
 import itertools
 import time
+from typing import Any
 
 import numpy as np
 import torch
@@ -20,6 +22,7 @@ from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 
 NETS = [128, 128, 32]
+DEFAULT = "OneStepSAC, 1 critic, 1 torch thread (default)"
 
 
 def main() -> None:
@@ -30,35 +33,20 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--device", default="cpu")
     options = parser.parse_args()
-    common = {"batch_size": options.batch, "seed": 0, "device": options.device, "learning_rate": 1e-3}
     env = SaccadeVecEnv(128, "lpf", log_reward=True, seed=0)
-    stock = SAC("MlpPolicy", env, policy_kwargs={"net_arch": NETS}, buffer_size=300_000, **common)
-    ours = {
-        critics: OneStepSAC(
-            "MlpPolicy",
-            env,
-            temperature=falling_temperature(),
-            replay_buffer_class=OneStepReplayBuffer,
-            buffer_size=300_000,
-            policy_kwargs={
-                "net_arch": NETS,
-                "features_extractor_class": GazeFeatures,
-                "n_critics": critics,
-                "optimizer_kwargs": {"fused": True},
-            },
-            **common,
-        )
-        for critics in (1, 2)
-    }
+    stock = SAC("MlpPolicy", env, policy_kwargs={"net_arch": NETS}, **common(options.batch, options.device))
+    one, two = (ours(env, critics, options.batch, options.device) for critics in (1, 2))
     threads = torch.get_num_threads()
     contestants = {
         f"stock SB3 SAC, 2 critics, {threads} torch threads": (stock, threads),
         "stock SB3 SAC, 2 critics, 1 torch thread": (stock, 1),
-        f"OneStepSAC, 1 critic, {threads} torch threads": (ours[1], threads),
-        "OneStepSAC, 1 critic, 1 torch thread (default)": (ours[1], 1),
-        "OneStepSAC, 2 critics, 1 torch thread": (ours[2], 1),
+        f"OneStepSAC, 1 critic, {threads} torch threads": (one, threads),
+        DEFAULT: (one, 1),
+        "OneStepSAC, 2 critics, 1 torch thread": (two, 1),
     }
-    for model in (stock, *ours.values()):
+    if options.device != "cpu":
+        contestants["the default, but on the CPU"] = (ours(env, 1, options.batch, "cpu"), 1)
+    for model in {id(model): model for model, _ in contestants.values()}.values():
         model.set_logger(Logger(folder=None, output_formats=[]))
         fill(model, env)
     seconds: dict[str, list[float]] = {name: [] for name in contestants}
@@ -83,9 +71,27 @@ def main() -> None:
         )
     torch.set_num_threads(1)
     products = matrix_products(options.batch, options.device)
-    own = float(np.median(times["OneStepSAC, 1 critic, 1 torch thread (default)"]))
+    own = float(np.median(times[DEFAULT]))
     name = "the matrix products of one such update alone"
     print(f"{name:48s} {1e3 * products:6.2f} ms: {100 * products / own:.0f} % of it")
+
+
+def common(batch: int, device: str) -> dict[str, Any]:
+    """What all contestants have alike."""
+    return {"buffer_size": 300_000, "batch_size": batch, "seed": 0, "device": device, "learning_rate": 1e-3}
+
+
+def ours(env: SaccadeVecEnv, critics: int, batch: int, device: str) -> OneStepSAC:
+    """Ours, as `orient-eye train` makes it."""
+    policy = {"net_arch": NETS, "features_extractor_class": GazeFeatures, "n_critics": critics}
+    return OneStepSAC(
+        "MlpPolicy",
+        env,
+        temperature=falling_temperature(),
+        replay_buffer_class=OneStepReplayBuffer,
+        policy_kwargs={**policy, "optimizer_kwargs": {"fused": True}},
+        **common(batch, device),
+    )
 
 
 def fill(model: SAC, env: SaccadeVecEnv) -> None:
