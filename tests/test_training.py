@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
+from orient_eye.environment import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.config import TrainConfig
 from orient_eye.learning.policy import Policy
@@ -81,6 +83,18 @@ def test_same_seed_same_numbers_other_seed_others(tiny: Path, tmp_path: Path) ->
     assert _metrics(tmp_path / "again") == _metrics(tiny)
     train(TrainConfig(**{**TINY.__dict__, "seed": 1}), tmp_path / "other", quiet=True)
     assert not np.array_equal(_numbers(tmp_path / "other")["weight0"], _numbers(tiny)["weight0"])
+
+
+def test_saccades_and_first_actions_come_from_streams_of_their_own(tiny: Path) -> None:
+    """Streams of one seed used twice would be the same numbers: as yaw of the start and as action."""
+    rows = torch.load(tiny / "checkpoint.pt", weights_only=True)["rows"][: TINY.warmup].double().numpy()
+    yaw = np.rad2deg(2 * np.arcsin(rows[:, 3]))  # of the start's quaternion (w, x, y, z)
+    starts, actions = (yaw + 35) / 70, (rows[:, 8:11].ravel() + 1) / 2
+    assert (starts.min(), starts.max()) == pytest.approx((0, 1), abs=0.1)  # the warmup covers the range
+    alike = np.abs(starts[:, None] - actions).min(axis=1) < 1e-5
+    assert alike.mean() < 0.1
+    other, _ = SaccadeVecEnv(16, seed=0).yaw_deg
+    assert not np.allclose(yaw[:16], other, atol=1e-3)
 
 
 def _command(folder: Path, *options: str) -> list[str]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from rich.progress import Progress
 from stable_baselines3.common.logger import Logger
 
@@ -32,7 +31,6 @@ from orient_eye.run_directory import RunDirectory, versions
 from orient_eye.saccade import SaccadeTask
 from orient_eye.surrogate import Surrogate
 
-Array = NDArray[np.float64]
 _NETS = [128, 128, 32]  # thesis 4.6
 
 
@@ -118,18 +116,15 @@ class _Run:
     def execute(self, *, resume: bool, quiet: bool) -> dict[str, Any]:
         config, folder = self.config, self.run.path
         # Independent streams from the one seed.
-        streams = np.random.SeedSequence(config.seed).spawn(2)
-        training, buffer = (int(stream.generate_state(1)[0]) for stream in streams)
+        streams = np.random.SeedSequence(config.seed).spawn(4)
+        networks, saccades, actions, buffer = (int(stream.generate_state(1)[0]) for stream in streams)
         torch.set_num_threads(1)  # these networks are too small to share
         assert config.saccades_per_update
         assert config.updates
-        env = SaccadeVecEnv(
-            config.saccades_per_update,
-            self.task,
-            log_reward=config.reward_scale == "log",
-            seed=training,
-        )
-        model = self._model(env, seed=config.seed, buffer_seed=buffer)
+        env = SaccadeVecEnv(config.saccades_per_update, self.task, log_reward=config.reward_scale == "log")
+        model = self._model(env, seed=networks, buffer_seed=buffer)
+        env.seed(saccades)  # SB3 has given both the seed of the networks
+        model.action_space.seed(actions)
         with progress_bar(quiet) as bar, CtrlC() as ctrl_c:
             yardstick, table = self._yardsticks(bar)
             loop = TrainingLoop(folder, env, config.updates, yardstick, table, bar, ctrl_c, self.checkpoint_s)
