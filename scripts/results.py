@@ -10,7 +10,6 @@ the best run of each case into models/policies.
 import concurrent.futures
 import json
 import os
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -63,23 +62,26 @@ def run(folder: Path, plant: str, case: str, seed: int) -> None:
     if (out / "result.json").exists():
         return
     command = [sys.executable, "-m", "orient_eye", "train", "--quiet"]
-    if (out / "checkpoint.pt").exists():
+    if (out / "run.json").exists():
         command += ["--resume", str(out)]
     else:
-        shutil.rmtree(out, ignore_errors=True)
         command += ["--plant", plant, "--case", case, "--seed", str(seed), "--out", str(out)]
     print("training", out.name, file=sys.stderr)
-    subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}, stderr=subprocess.DEVNULL)
+    one_thread = {**os.environ, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, check=False, env=one_thread, stderr=subprocess.PIPE, text=True)
+    if done.returncode:
+        sys.exit(f"{out.name} ended with code {done.returncode}:\n{done.stderr}")
 
 
 def results(folder: Path) -> dict[tuple[str, str], list[dict[str, Any]]]:
     """The results of all runs, by plant and case, by seed."""
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for path in sorted(folder.glob("*-seed*/result.json")):
+    for path in folder.glob("*-seed*/result.json"):
         plant, rest = path.parent.name.split("-", 1)
+        case, seed = rest.rsplit("-seed", 1)
         result = json.loads(path.read_text(encoding="utf-8"))
-        found.setdefault((plant, rest.rsplit("-seed", 1)[0]), []).append({**result, "folder": path.parent})
-    return found
+        found.setdefault((plant, case), []).append({**result, "seed": int(seed), "folder": path.parent})
+    return {key: sorted(found[key], key=lambda run: run["seed"]) for key in sorted(found)}
 
 
 def table(folder: Path) -> str:
@@ -109,7 +111,6 @@ def ship(folder: Path) -> None:
     for (plant, case), runs in results(folder).items():
         best = runs[int(np.argmin([run["gap_mean"] for run in runs]))]["folder"]
         policy = Policy.load(best)
-        policy.manifest["result"].pop("out", None)  # a path of the machine it was trained on
         policy.save(POLICIES / f"{plant}-{case}")
         print(f"models/policies/{plant}-{case}: from {best.name}", file=sys.stderr)
 

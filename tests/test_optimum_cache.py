@@ -269,11 +269,11 @@ def test_command_finds_and_remembers(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_command_takes_pairs_and_every_option(searches: list[SaccadeTask], tmp_path: Path) -> None:
     pairs, surrogate = tmp_path / "pairs.csv", tmp_path / "surrogate.json"
-    pairs.write_text("start_yaw_deg,target_yaw_deg\n0,30\n10,10\n", encoding="utf-8")
+    pairs.write_text("start_yaw_deg,target_yaw_deg\n0,30\n10,12\n", encoding="utf-8")
     Surrogate(1.5, 16.0).save(surrogate)
     options = f"--pairs {pairs} --case 3-varying --surrogate {surrogate} --speed-limit 3000 --band 0.02"
     result = command(*options.split(), "--weights", "1", "2", "3", "4", "--quiet").run()
-    assert [(r["start_yaw_deg"], r["target_yaw_deg"]) for r in result["saccades"]] == [(0, 30), (10, 10)]
+    assert [(r["start_yaw_deg"], r["target_yaw_deg"]) for r in result["saccades"]] == [(0, 30), (10, 12)]
     (done,) = searches
     expected = SaccadeTask(
         LowPassPlant(Surrogate(1.5, 16.0)), variant=3, C="varying", speed_limit=3000, weights=Weights(1, 2, 3, 4)
@@ -319,6 +319,7 @@ def test_command_knows_the_cases() -> None:
         ({"start": 0.0, "target": 5.0, "eye": "eve_v3"}, "--eye does nothing"),
         ({"start": 0.0, "target": 5.0, "weights": (1.0, 1.0, -1.0, 1.0)}, "not negative"),
         ({"start": 0.0, "target": 5.0, "band": 1.5}, "settling band"),
+        ({"start": 5.0, "target": 5.0}, "both 5 deg"),
         ({"start": 0.0, "target": 5.0, "out": Path()}, "is a folder"),
     ],
 )

@@ -462,8 +462,9 @@ def test_stock_sac_is_imported(task: SaccadeTask, tmp_path: Path) -> None:
 def test_networks_that_would_act_otherwise_are_not_imported(task: SaccadeTask, tmp_path: Path) -> None:
     import torch
 
-    with pytest.raises(InputError, match="Tanh"):
-        import_sb3(stock(tmp_path, task, policy_kwargs={"net_arch": [8], "activation_fn": torch.nn.Tanh}), task)
+    for other in (torch.nn.Tanh, torch.nn.ReLU6, torch.nn.LeakyReLU):
+        with pytest.raises(InputError, match=f"have {other.__name__}$"):
+            import_sb3(stock(tmp_path, task, policy_kwargs={"net_arch": [8], "activation_fn": other}), task)
     with pytest.raises(InputError, match="use_sde"):
         import_sb3(stock(tmp_path, task, use_sde=True), task)
     two = SaccadeTask(make_plant("tavares"), driven=("motor1", "motor2"))

@@ -18,8 +18,10 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import gammainc
 
 from orient_eye.errors import InputError
+from orient_eye.plants import make_plant
 from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.pulse_step import FIXED_C, PULSES, SPEED_LIMIT, PulseStep, varying_C
+from orient_eye.pulse_step import FIXED_C, PULSES, SPEED_LIMIT, PulseStep, keeps_speed_limit, varying_C
+from orient_eye.saccade import SaccadeTask, horizontal
 from orient_eye.surrogate import Surrogate
 
 Array = NDArray[np.float64]
@@ -304,7 +306,9 @@ def test_variant2_starts_at_the_limit(step: float, B: float, k0: float, V: float
 def test_variant3_is_the_smaller_root_of_the_bound(step: float, B: float, k0: float, V: float) -> None:
     """Thesis 4.31 by bracketing: the bound falls with C up to C = B, so that the smaller root is below B."""
     C = find_C(3, step, B, k0, V)
-    if bound_of_variant3(B, step, B, k0) >= V:  # its least value
+    kept = keeps_speed_limit(3, np.array(step), np.array(B), np.array(k0), V)
+    assert bool(kept) == (bound_of_variant3(B, step, B, k0) < V)
+    if not kept:  # C = B has the least value
         assert pytest.approx(B, rel=1e-12) == C
         return
     root = brentq(lambda c: bound_of_variant3(c, step, B, k0) - V, 1e-9, B, xtol=1e-14, rtol=1e-14)
@@ -331,6 +335,18 @@ def test_infeasible_commands_get_the_nearest_C(variant: int) -> None:
     bounds = [bound_of_variant3(c, step, B, k0) if variant == 3 else Plain(2, 0, B, step, k0, c).A * c for c in others]
     assert found > SPEED_LIMIT
     assert found <= min(bounds) * (1 + 1e-12)
+    assert keeps_speed_limit(variant, *np.array([[160.0], [80.0], [5.0]])).tolist() == [False]
+    assert keeps_speed_limit(variant, *np.array([[20.0], [35.0], [17.5]])).tolist() == [True]
+
+
+@pytest.mark.parametrize("variant", FIXED_C)
+def test_outcome_tells_commands_that_no_C_holds_to_the_limit(variant: int) -> None:
+    plant = make_plant("lpf")
+    action = np.array([[[35.0, 20.33, 17.5]], [[80.0, 80.0, 5.0]]])
+    for C, expected in (("varying", [False, True]), (None, [False, False])):
+        task = SaccadeTask(plant, variant=variant, C=C)
+        outcome = task.perform(task.fixate(horizontal([0.0, 0.0])), action, horizontal([30.0, 30.0]))
+        assert outcome.too_fast.tolist() == expected
 
 
 @pytest.mark.parametrize("variant", FIXED_C)

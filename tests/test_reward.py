@@ -1,5 +1,5 @@
-"""Reward, saccade task and the search for the best action: plain formulas, the table of the specification,
-and searches by other means.
+"""Reward, saccade task and the search for the best action: plain formulas, the numbers of an independent
+program, and searches by other means.
 """
 
 import functools
@@ -218,7 +218,7 @@ def test_an_action_that_is_none_fails_alone(plant: Any) -> None:
 
 # --- the best action ------------------------------------------------------------------------------
 
-# Spec: optimal actions of variant 1, weights (2.66e7, 1, 5.12e5, 2.3e8), band 1 %, symmetric saccades.
+# Optimal actions of variant 1 by an independent program: weights (2.66e7, 1, 5.12e5, 2.3e8), band 1 %, symmetric.
 AMPLITUDE = np.array([5.0, 10.0, 20.0, 30.0, 45.0, 60.0])
 TABLE_B = np.array([80, 64.45, 43.67, 34.88, 27.45, 22.72])
 TABLE_KD = np.array([4.586, 9.581, 19.840, 30.002, 45.203, 60.383])

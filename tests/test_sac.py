@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from orient_eye.environment import SaccadeVecEnv
+from orient_eye.errors import InputError
 from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 from orient_eye.rotations import from_euler, rotation
 
 
-def make_model(env: SaccadeVecEnv, critics: int = 1, **settings: object) -> OneStepSAC:
+def make_model(env: VecEnv, critics: int = 1, **settings: object) -> OneStepSAC:
     model = OneStepSAC(
         "MlpPolicy",
         env,
@@ -61,11 +63,14 @@ def test_network_passes_are_those_of_autograd() -> None:
 
 def test_network_refuses_other_layers() -> None:
     for modules in ([], [torch.nn.Linear(2, 2), torch.nn.Tanh(), torch.nn.Linear(2, 2)], [torch.nn.ReLU()]):
-        with pytest.raises(TypeError, match="ReLU between"):
+        with pytest.raises(InputError, match="ReLU between"):
             Network(modules)
 
 
-@pytest.mark.parametrize("settings", [{"fused": True}, {"foreach": False}, {"amsgrad": True, "weight_decay": 0.1}])
+@pytest.mark.parametrize(
+    "settings",
+    [{"fused": True}, {"foreach": False}, {"amsgrad": True, "weight_decay": 0.1, "decoupled_weight_decay": True}],
+)
 def test_step_of_a_flat_vector_is_that_of_torchs_adam(settings: dict[str, Any]) -> None:
     torch.manual_seed(0)
     flat, plain = torch.nn.Linear(5, 3), torch.nn.Linear(5, 3)
@@ -177,8 +182,68 @@ def test_learning_gets_better_and_keeps_sb3s_interface(env: SaccadeVecEnv, tmp_p
     assert mean_reward(model) > mean_reward(make_model(env)) + 0.3  # half a decade of the reward
 
 
-def test_automatic_temperature_learns(env: SaccadeVecEnv) -> None:
+def test_automatic_temperature_moves_as_sb3s_own_rule(env: SaccadeVecEnv) -> None:
     model = make_model(env, temperature=None, ent_coef="auto_0.5", learning_rate=1e-2)
-    model.learn(16 * 40)
-    assert model.log_ent_coef is not None
-    assert 0 < float(model.log_ent_coef.detach().exp()) != pytest.approx(0.5)
+    model.learn(64)
+    before = float(model.log_ent_coef.detach())
+    assert before != pytest.approx(np.log(0.5))
+    model.ent_coef_optimizer = torch.optim.SGD([model.log_ent_coef], lr=1.0)  # a step is the gradient
+    data = model.replay_buffer.sample(64)
+    torch.manual_seed(5)
+    _, log_probability = model.actor.action_log_prob(data.observations)
+    loss = -(model.log_ent_coef * (log_probability + model.target_entropy).detach()).mean()  # of SB3's SAC
+    (gradient,) = torch.autograd.grad(loss, model.log_ent_coef)
+    with torch.no_grad():
+        torch.manual_seed(5)
+        _, temperature = model._update_policy(model.actor.features_extractor(data.observations))
+    assert float(temperature) == pytest.approx(np.exp(before))  # the one before the step, as SB3 has it
+    assert float(model.log_ent_coef.detach()) == pytest.approx(before - float(gradient), rel=1e-4)
+
+
+def test_normalised_observations_and_rewards_reach_the_updates(env: SaccadeVecEnv) -> None:
+    normalised = VecNormalize(env)
+    model = make_model(normalised)
+    model.learn(64)
+    buffer = model.replay_buffer
+    state = buffer.random.bit_generator.state
+    plain = buffer.sample(64)
+    buffer.random.bit_generator.state = state
+    sample = buffer.sample(64, env=normalised)
+    np.testing.assert_allclose(sample.observations, normalised.normalize_obs(plain.observations.numpy()), rtol=1e-6)
+    np.testing.assert_allclose(sample.rewards, normalised.normalize_reward(plain.rewards.numpy()), rtol=1e-6)
+    asked: list[object] = []
+    buffer.sample = lambda size, env=None: asked.append(env) or sample
+    model.train(1, 64)
+    assert asked == [normalised]
+
+
+def test_replay_buffer_is_saved_and_loaded(env: SaccadeVecEnv, tmp_path: Path) -> None:
+    model = make_model(env)
+    model.learn(64)
+    model.save_replay_buffer(tmp_path / "buffer.pkl")
+    other = make_model(env)
+    other.load_replay_buffer(tmp_path / "buffer.pkl")
+    np.testing.assert_array_equal(other.replay_buffer.rows, model.replay_buffer.rows)
+    other.learn(64)
+
+
+class Learned(GazeFeatures):
+    """Features with a parameter."""
+
+    def __init__(self, observation_space: Any) -> None:
+        super().__init__(observation_space)
+        self.scale = torch.nn.Parameter(torch.ones(6))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"ent_coef": 0.5}, "not both"),
+        ({"use_sde": True}, "exploration"),
+        ({"policy_kwargs": {"features_extractor_class": Learned}}, "without parameters"),
+        ({"policy_kwargs": {"activation_fn": torch.nn.Tanh}}, "ReLU"),
+    ],
+)
+def test_refuses_what_it_would_train_wrongly(env: SaccadeVecEnv, settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        OneStepSAC("MlpPolicy", env, **{"temperature": falling_temperature(), **settings})

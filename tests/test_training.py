@@ -1,34 +1,41 @@
 """Training runs: what they leave, that they can be stopped, killed and resumed to the same numbers."""
 
 import json
-import os
+import math
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+from orient_eye.cli.train import Train
 from orient_eye.environment import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.config import TrainConfig
+from orient_eye.learning.loop import TrainingLoop
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.training import resume, train
 from orient_eye.plants import make_plant
-from orient_eye.saccade import SaccadeTask, horizontal
+from orient_eye.reward import reward
+from orient_eye.saccade import Fixation, Outcome, SaccadeTask, horizontal
 
 TINY = TrainConfig(updates=60, saccades_per_update=16, warmup=64, batch_size=64, evaluation_pairs=4)
 
 
-@pytest.fixture(autouse=True, scope="session")
-def _private_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
-    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
+@pytest.fixture(autouse=True, scope="module")
+def _private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "tiny"
     train(TINY, folder, quiet=True)
@@ -127,12 +134,78 @@ def test_half_a_checkpoint_is_not_taken_for_a_whole_one(tiny: Path, tmp_path: Pa
     folder.mkdir()
     for name in ("run.json", "surrogate.json"):
         (folder / name).write_bytes((tiny / name).read_bytes())
-    with pytest.raises(InputError, match="no checkpoint"):
-        resume(folder, quiet=True)
     whole = (tiny / "checkpoint.pt").read_bytes()
     (folder / "checkpoint.pt").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="does not fit"):
         resume(folder, quiet=True)
+    (folder / "checkpoint.pt").write_bytes(b"")  # as a loss of power leaves it
+    with pytest.raises(InputError, match="cannot be read"):
+        resume(folder, quiet=True)
+
+
+def test_killed_before_the_first_checkpoint_a_run_begins_again(tiny: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "run.json").write_bytes((tiny / "run.json").read_bytes())
+    resume(folder, quiet=True)
+    assert _metrics(folder) == _metrics(tiny)
+    for name, array in _numbers(tiny).items():
+        np.testing.assert_array_equal(_numbers(folder)[name], array)
+
+
+def test_every_number_of_updates_has_its_last_evaluation(tmp_path: Path) -> None:
+    train(replace(TINY, updates=103), tmp_path / "run", quiet=True)
+    assert _metrics(tmp_path / "run")[-1].startswith("103,")
+    assert {file.stem for file in (tmp_path / "run" / "stages").glob("*.npz")} == {"000", "010", "025", "050", "100"}
+
+
+def test_stop_asked_for_at_the_very_end_lets_the_run_finish(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    finish = TrainingLoop.finish
+
+    def pressed(loop: TrainingLoop) -> None:
+        loop.ctrl_c.pressed = True
+        finish(loop)
+
+    monkeypatch.setattr(TrainingLoop, "finish", pressed)
+    assert train(TINY, tmp_path / "run", quiet=True)["updates"] == 60
+
+
+def test_a_training_that_diverges_says_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"diverged at update .* smaller --learning-rate"):
+        train(replace(TINY, learning_rate=1e30), tmp_path / "run", quiet=True)
+
+
+def test_failed_saccades_stop_nothing_and_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every third saccade of the training comes out as not a number."""
+    perform = SaccadeTask.perform
+
+    def failing(task: SaccadeTask, start: Fixation, action: np.ndarray, target: np.ndarray) -> Outcome:
+        outcome = perform(task, start, action, target)
+        if len(action) != TINY.saccades_per_update:
+            return outcome  # of the evaluation
+        measures = replace(outcome.measures, failed=np.arange(len(action)) % 3 == 0)
+        worst = reward(measures, outcome.command.energy(), target, task.weights)
+        return replace(outcome, measures=measures, reward=worst)
+
+    monkeypatch.setattr(SaccadeTask, "perform", failing)
+    result = Train(TINY, out=tmp_path / "run", quiet=True).run()
+    assert result["failed_saccades"] == 6 * (TINY.warmup // 16 + 60)
+    assert _metrics(tmp_path / "run")[-1].endswith(f",{result['failed_saccades']}")
+    assert f"{result['failed_saccades']} simulated saccades failed" in capsys.readouterr().err
+
+
+def test_resume_refuses_what_is_no_run_of_this_version(tiny: Path, tmp_path: Path) -> None:
+    description = json.loads((tiny / "run.json").read_text())
+    other = {**description, "config": {**description["config"], "nosuch": 1}}
+    for content, message in ((other, "not of this version"), ([], "not of train"), ({"command": "sysid"}, "sysid")):
+        (tmp_path / "run.json").write_text(json.dumps(content))
+        with pytest.raises(InputError, match=message):
+            resume(tmp_path, quiet=True)
+    (tmp_path / "run.json").write_text(json.dumps({**description, "versions": {"torch": "1.0"}}))
+    with pytest.warns(UserWarning, match=r"torch.*1\.0"):
+        resume(tmp_path, quiet=True)
 
 
 def test_refusals_leave_nothing_behind(tiny: Path, tmp_path: Path) -> None:
@@ -148,6 +221,10 @@ def test_refusals_leave_nothing_behind(tiny: Path, tmp_path: Path) -> None:
         {"temperature": (0.0, 1.0)},
         {"seed": -1},
         {"surrogate": "nosuch"},
+        {"eye": "eve_v3"},  # does nothing on lpf
+        {"learning_rate": math.inf},
+        {"last_learning_rate": 2.0},
+        {"device": "cudas"},
     ):
         with pytest.raises(InputError):
             train(TrainConfig(**{**TINY.__dict__, **wrong}), tmp_path / "bad", quiet=True)

@@ -1,4 +1,4 @@
-"""Weights: the table of the specification, the thesis' print, another route to the same equations, and refusals."""
+"""Weights: the numbers of an independent program, the thesis' print, another route to them, and refusals."""
 
 import json
 from dataclasses import astuple, replace
@@ -14,6 +14,7 @@ from orient_eye import measures
 from orient_eye.cases import CASES
 from orient_eye.cli.weights import WeightsCommand
 from orient_eye.errors import InputError
+from orient_eye.optimum import find_optimum
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import TavaresPlant
@@ -27,7 +28,7 @@ from orient_eye.weights import ChosenSaccade, Steps, resolve, solve_weights
 Array = NDArray[np.float64]
 THESIS_BAND = 0.01 / np.sqrt(2)
 
-# Computed by an independent program (section "Weights" of this project's specification), at B = 35, D = 20.33,
+# Computed by an independent program before this one was written, at B = 35, D = 20.33,
 # k0 = 17.5: lambda_a and lambda_d with a band of 1 %; lambda_a, lambda_d and lambda_o with a band of 0.707 %.
 SPECIFIED: dict[str, tuple[tuple[float, float], tuple[float, float, float]]] = {
     "1": ((2.69e7, 5.13e5), (3.81e7, 4.89e5, 2.4e8)),
@@ -58,7 +59,7 @@ def three(weights: Weights) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize("band", [0.01, 0.00707, THESIS_BAND])
-def test_command_prints_the_table_of_the_specification(band: float) -> None:
+def test_command_prints_the_table_of_an_independent_program(band: float) -> None:
     result = WeightsCommand(band=band).run()
     assert [row["case"] for row in result["cases"]] == list(CASES)
     for row in result["cases"]:
@@ -78,6 +79,15 @@ def test_thesis_prints_the_weights_of_the_narrow_band(case: str) -> None:
     found = three(solve_weights(lpf_task(case, band=THESIS_BAND)))
     np.testing.assert_allclose(found[:2], PRINTED[case][:2], rtol=0.05)
     assert found[2] == pytest.approx(PRINTED[case][2], rel=0.15)
+
+
+@pytest.mark.parametrize(("factor", "B", "k0"), [(1, 22.5, 40.0), (10, 34.9, 17.49)])
+def test_printed_weights_of_variant_1_are_a_decade_low(factor: float, B: float, k0: float) -> None:
+    """As printed, the best saccade is not the one they were solved for; with ten times the two it is."""
+    task = lpf_task("1", band=0.00707, weights=Weights(3.8e6 * factor, 1.0, 4.9e4 * factor, 2.3e8))
+    best = find_optimum(task, task.fixate(horizontal([0.0])), horizontal([30.0]), np.random.default_rng(0))
+    assert best.action[0, 0, 0] == pytest.approx(B, abs=0.1)
+    assert best.action[0, 0, 2] == pytest.approx(k0, abs=0.02)
 
 
 @pytest.mark.parametrize("case", CASES)

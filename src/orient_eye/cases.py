@@ -1,8 +1,9 @@
 """The five learning cases of the thesis (its Chapter 5): a pulse, its C, and the weights of the reward.
 
 The weights make a saccade from 0 to 30 deg with B = 35 optimal, settling band 1 %: on the thesis' low-pass
-plant with k0 = 17.5 and K D = 30 deg, on the whole eye with the D that rests at 30 deg and the k0 below which
-it overshoots. `orient-eye weights` and `orient-eye weights --plant mujoco` solve them again.
+plant with k0 = 17.5 and K D = 30 deg (`orient-eye weights --D 20.328`; lambda_o of variant 1 is the thesis'
+print), on the whole eye with the D that rests at 30 deg and the k0 below which it overshoots (`orient-eye
+weights --plant mujoco`). A plant with other constants keeps those of its kind.
 """
 
 from dataclasses import dataclass

@@ -171,7 +171,11 @@ def describe(outcome: Outcome) -> list[dict[str, Any]]:
     table: dict[str, Any] = {"B": command.B, "D": command.D, "k0": command.k0, "F": command.F}
     table |= {name: value for name, value in asdict(measures).items() if name not in ("final", "at_settling")}
     table |= {f"reward_{name}": value for name, value in asdict(outcome.reward).items()}
-    table |= {"final_yaw_deg": to_euler(measures.final)[0], "saturated": outcome.saturated}
+    table |= {
+        "final_yaw_deg": to_euler(measures.final)[0],
+        "saturated": outcome.saturated,
+        "too_fast": outcome.too_fast,
+    }
     rows = []
     for i in range(len(measures.failed)):
         row = {name: np.squeeze(value[i]) for name, value in table.items()}

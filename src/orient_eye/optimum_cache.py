@@ -1,7 +1,7 @@
 """Searched optima, kept on disk: a search on the MuJoCo eye takes minutes, and its answer never changes.
 
 One .npz file a search, named by the hash of everything its answer depends on: plant, pulse, reward,
-bounds, saccades, and the search itself. Delete the folder at any time.
+bounds, saccades, the search itself and the version of orient-eye. Delete the folder at any time.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
+from orient_eye import __version__
 from orient_eye.files import write_atomically
 from orient_eye.optimum import Optimum, find_optimum
 from orient_eye.saccade import SaccadeTask, horizontal
@@ -49,6 +50,7 @@ def searched_optimum(
     """
     key = {
         "search": _SEARCH,
+        "version": __version__,
         "task": task.identity(),
         "start_yaw_deg": start_yaw_deg.tolist(),
         "target_yaw_deg": target_yaw_deg.tolist(),

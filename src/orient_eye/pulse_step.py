@@ -69,7 +69,8 @@ def varying_C(variant: int, step: Array, B: Array, k0: Array, speed_limit: float
 
     A command can be so large that no C keeps the limit. Then C is what comes nearest: in variant 2,
     where the initial speed falls with C, the slowest onset (C = 0.01 B, short of the limit C -> 0, in
-    which the pulse becomes that of variant 1); in variant 3 the C = B at which the bound is least.
+    which the pulse becomes that of variant 1); in variant 3 the C = B at which the bound is least;
+    `keeps_speed_limit` tells such commands.
     Both are continuous with the feasible values. Variant 3 too keeps C >= 0.01 B, for saccades so small
     that the limit asks for less. A saccade of size 0 has C at its bound.
 
@@ -81,15 +82,25 @@ def varying_C(variant: int, step: Array, B: Array, k0: Array, speed_limit: float
         speed_limit: V [deg/s].
     """
     size = np.maximum(np.abs(step), 1e-9)
+    feasible = keeps_speed_limit(variant, step, B, k0, speed_limit)
     if variant == 2:
         C = speed_limit * k0 / (size * B) - B
-        return np.clip(C, _SLOWEST_ONSET * B, 1e5)
+        return np.where(feasible, np.minimum(C, 1e5), _SLOWEST_ONSET * B)
     # a (B + C)^2 = W C, with a = |D - F| B / (k0 e) and W = V - |D - F| B
     a, W = size * B / (k0 * np.e), speed_limit - size * B
-    feasible = 4 * a * B < W
     root = np.sqrt(np.where(feasible, W**2 - 4 * a * B * W, 0.0))
     C = np.where(feasible, 2 * a * B**2 / np.where(feasible, W - 2 * a * B + root, 1.0), B)
     return np.maximum(C, _SLOWEST_ONSET * B)
+
+
+def keeps_speed_limit(
+    variant: int, step: Array, B: Array, k0: Array, speed_limit: float = SPEED_LIMIT
+) -> NDArray[np.bool_]:
+    """Whether some C holds a command to the speed limit, by the bounds that `varying_C` solves; its arguments."""
+    size = np.maximum(np.abs(step), 1e-9)
+    if variant == 2:
+        return speed_limit * k0 / (size * B) - B >= _SLOWEST_ONSET * B
+    return 4 * size * B**2 / (k0 * np.e) < speed_limit - size * B
 
 
 @dataclass(frozen=True)

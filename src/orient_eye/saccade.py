@@ -1,6 +1,6 @@
 """One saccade from command to reward, a batch at a time, on any plant.
 
-    task = SaccadeTask(make_plant("mujoco"))
+    task = SaccadeTask.of_case(make_plant("mujoco"), "1")
     start = task.fixate(horizontal([0, 0]))          # the eye rests there
     outcome = task.perform(start, action, horizontal([10, 20]))   # action (saccades, driven, 3): B, D, k0
 
@@ -17,7 +17,7 @@ from orient_eye.errors import InputError
 from orient_eye.measures import BAND, Measures, measure, measure_response
 from orient_eye.plants import Plant
 from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.pulse_step import FIXED_C, SPEED_LIMIT, PulseStep, varying_C
+from orient_eye.pulse_step import FIXED_C, SPEED_LIMIT, PulseStep, keeps_speed_limit, varying_C
 from orient_eye.reward import Reward, Weights, reward
 from orient_eye.rotations import from_yaw
 from orient_eye.trajectory import EyeState, Trajectory
@@ -56,12 +56,14 @@ class Outcome:
         measures: of the eye's movement.
         reward: its terms and total.
         saturated: True where the command reached beyond a motor's mechanical range and stayed at it.
+        too_fast: True where C varies and no C holds the command to the speed limit.
     """
 
     command: PulseStep
     measures: Measures
     reward: Reward
     saturated: NDArray[np.bool_]
+    too_fast: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,8 @@ class SaccadeTask:
         C: onset rate [1/s] of variants 2 and 3; None for the thesis' fixed value, "varying" for the value
             that brings the motor to the speed limit.
         speed_limit: V [deg/s], for a varying C.
-        weights: of the reward.
+        weights: of the reward; unless given, those of case 1 on the low-pass plant, whatever the plant and
+            variant: `of_case` knows the others.
         band: settling band, share of the amplitude.
         horizon_s: how long a simulated saccade lasts; the low-pass plant has no horizon.
     """
@@ -204,7 +207,14 @@ class SaccadeTask:
             final = start.motor.copy()
             final[:, self.driven_index] = command.D
             measures = measure(trajectory, self.plant.rest_orientation(final), band=self.band)
-        return Outcome(command, measures, reward(measures, command.energy(), target, self.weights), saturated)
+        found = reward(measures, command.energy(), target, self.weights)
+        return Outcome(command, measures, found, saturated, self._too_fast(command))
+
+    def _too_fast(self, command: PulseStep) -> NDArray[np.bool_]:
+        if self.onset != "varying":
+            return np.zeros(len(command.B), bool)
+        step = command.D - command.F
+        return ~np.all(keeps_speed_limit(self.variant, step, command.B, command.k0, self.speed_limit), axis=1)
 
     def trajectory(self, start: Fixation, action: Array) -> Trajectory:
         """The eye's movement under an action, sampled over the horizon."""

@@ -1,6 +1,6 @@
 """Reward weights from the saccade that should be optimal, thesis section 4.4.5.
 
-    weights = solve_weights(SaccadeTask(make_plant("lpf"), variant=2, C="varying"))
+    weights = solve_weights(SaccadeTask.of_case(make_plant("lpf"), "2-varying"))
 
 Choose the optimal command of one saccade, set lambda_e = 1, and the other three weights solve
 grad R = 0 over (B, D, k0) at that command (4.47); gradients by central differences. Tables and what
@@ -10,7 +10,6 @@ they depend on: docs/weights.md.
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
 from orient_eye.plants import Plant
@@ -19,7 +18,6 @@ from orient_eye.reward import Weights
 from orient_eye.saccade import K0_RANGE, SaccadeTask, horizontal
 from orient_eye.surrogate import Surrogate
 
-Array = NDArray[np.float64]
 _THESIS_D = 20.33  # deg; 30 deg / K = 20.328 on the thesis' surrogate, which the thesis takes as 20.33
 
 

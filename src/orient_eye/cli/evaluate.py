@@ -72,6 +72,8 @@ class Evaluate:
             f"mean reward gap to the searched optimum over {count} random saccades: "
             f"{100 * result['gap_mean']:.2f} % (95th percentile {100 * result['gap_p95']:.2f} %)"
         )
+        if result["failed_saccades"]:
+            say(f"[red]{result['failed_saccades']} simulated saccades failed and got the worst reward[/red]")
         mean, most = (result[f"yaw_error_{name}_deg"] for name in ("mean", "max"))
         say(f"final yaw off by {mean:.3f} deg in the mean, {most:.3f} deg at most")
         say(f"in {run.path}: result.json, pairs.csv, figure_5_*.png, recording.rrd")

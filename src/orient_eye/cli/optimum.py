@@ -53,7 +53,8 @@ class OptimumCommand:
     speed_limit: float = 7200.0
     """Motor speed to which a varying C brings the command, deg/s."""
     weights: Annotated[
-        tuple[float, float, float, float] | None, tyro.conf.arg(help_behavior_hint="(default: those of the case)")
+        tuple[float, float, float, float] | None,
+        tyro.conf.arg(help_behavior_hint="(default: those of the case on the plant)"),
     ] = None
     """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32; orient-eye weights)."""
     band: float = 0.01
@@ -67,10 +68,9 @@ class OptimumCommand:
 
     def run(self) -> dict[str, Any]:
         """Search, or remember, and print the table."""
-        from orient_eye.cases import get_case
         from orient_eye.cli import say
-        from orient_eye.cli.weights import chosen_plant
         from orient_eye.errors import InputError
+        from orient_eye.plants import chosen_plant
         from orient_eye.reward import Weights
         from orient_eye.saccade import SaccadeTask
 
@@ -80,9 +80,9 @@ class OptimumCommand:
         task = SaccadeTask.of_case(
             chosen_plant(self.plant, self.surrogate, self.eye),
             self.case,
-            weights=Weights(*self.weights) if self.weights else get_case(self.case).weights(self.plant),
             band=self.band,
             speed_limit=self.speed_limit,
+            **({"weights": Weights(*self.weights)} if self.weights else {}),
         )
         _check_yaw(task, start, target)
         best, remembered = self._search(task, start, target)
@@ -234,7 +234,7 @@ def read_pairs(path: Path) -> "tuple[Array, Array]":
 
 
 def _check_yaw(task: "SaccadeTask", start: "Array", target: "Array") -> None:
-    """Refuse what no action can reach: the eye must rest there with D inside its bounds."""
+    """Refuse what is no saccade, or none an action can make: the eye must rest there with D inside its bounds."""
     import numpy as np
 
     from orient_eye.errors import InputError
@@ -251,6 +251,8 @@ def _check_yaw(task: "SaccadeTask", start: "Array", target: "Array") -> None:
                 f"{name} at {value:g} deg: the eye of plant {task.plant.name!r} can be held between {low:.1f} and "
                 f"{high:.1f} deg of yaw; choose an angle in this range"
             )
+    for value in target[start == target]:
+        raise InputError(f"start and target are both {value:g} deg: a saccade goes from one gaze direction to another")
 
 
 def _rows(task: "SaccadeTask", start_yaw: "Array", target_yaw: "Array", best: "Optimum") -> list[dict[str, Any]]:

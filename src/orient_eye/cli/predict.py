@@ -41,8 +41,8 @@ class AnotherPlant:
             InputError: something differs, and it is not forced.
         """
         from orient_eye.cli import say
-        from orient_eye.cli.weights import chosen_plant
         from orient_eye.errors import InputError
+        from orient_eye.plants import chosen_plant
 
         if self.plant is None and (self.surrogate or self.eye):
             raise InputError("--surrogate and --eye say more about --plant; without it the policy's own plant is used")
@@ -173,7 +173,8 @@ def saccade_rows(
         "skewness": measures.skewness,
         "reward": outcome.reward.total,
     }
-    flags = {"settled": measures.settled, "saturated": outcome.saturated, "failed": measures.failed}
+    flags = {"settled": measures.settled, "saturated": outcome.saturated, "too_fast": outcome.too_fast}
+    flags["failed"] = measures.failed
     return [
         {name: float(values[i]) if np.isfinite(values[i]) else None for name, values in numbers.items()}
         | {name: bool(values[i]) for name, values in flags.items()}
@@ -209,7 +210,8 @@ def _table(rows: list[dict[str, Any]], task: "SaccadeTask") -> "Table":
         table.add_column(escape(name), justify="right")
     for row in rows:
         saccade = f"{row['start_yaw_deg']:g} to {row['target_yaw_deg']:g}"
-        command = (f"{row[key]:.4g}" if key.startswith("C") else f"{row[key]:.3f}" for key in keys)
+        fast = " (too fast)" if row["too_fast"] else ""
+        command = (f"{row[key]:.4g}{fast}" if key.startswith("C") else f"{row[key]:.3f}" for key in keys)
         if row["failed"]:
             table.add_row(saccade, *command, "failed")
             continue

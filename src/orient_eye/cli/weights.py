@@ -59,6 +59,7 @@ class WeightsCommand:
 
         from orient_eye.cases import CASES
         from orient_eye.cli import say
+        from orient_eye.plants import chosen_plant
         from orient_eye.weights import ChosenSaccade, Steps
 
         chosen = ChosenSaccade(self.start, self.target, self.B, self.D, self.k0)
@@ -106,18 +107,3 @@ class WeightsCommand:
             "D": resolved.D,
             "k0": resolved.k0,
         }
-
-
-def chosen_plant(name: str, surrogate: str, eye: str) -> "Plant":
-    """The plant that the options --plant, --surrogate and --eye choose.
-
-    Raises:
-        InputError: unknown, or an option that does nothing on this plant.
-    """
-    from orient_eye.errors import InputError
-    from orient_eye.plants import make_plant
-
-    option, given = ("--eye", eye) if name == "lpf" else ("--surrogate", surrogate)
-    if given != "thesis":
-        raise InputError(f"{option} does nothing on plant {name!r}; leave it out or choose another plant")
-    return make_plant(name, surrogate=surrogate) if name == "lpf" else make_plant(name, eye=eye)

@@ -6,6 +6,7 @@ whole or not at all, and read with torch's loader of plain tensors, which runs n
 
 import json
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from orient_eye.files import write_atomically
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import OneStepSAC
 
-_NAME = "checkpoint.pt"
+NAME = "checkpoint.pt"
 
 
 def save_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv, extra: dict[str, Any]) -> Path:
@@ -52,7 +53,7 @@ def save_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv, extra: 
             }
         ),
     }
-    return write_atomically(folder / _NAME, lambda temporary: torch.save(content, temporary))
+    return write_atomically(folder / NAME, lambda temporary: torch.save(content, temporary))
 
 
 def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict[str, Any]:
@@ -62,7 +63,7 @@ def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict
         InputError: there is no checkpoint, or it does not fit.
     """
     try:
-        content = torch.load(folder / _NAME, weights_only=True)
+        content = torch.load(folder / NAME, weights_only=True)
         plain = json.loads(content["plain"])
         model.policy.load_state_dict(content["policy"])
         model.actor.optimizer.load_state_dict(content["actor_optimizer"])
@@ -74,10 +75,8 @@ def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict
             model.ent_coef_optimizer.load_state_dict(content["temperature"]["optimizer"])
         buffer = _buffer(model)
         buffer.rows[: len(content["rows"])] = content["rows"].numpy()
-    except FileNotFoundError as error:
-        raise InputError(f"{folder} has no checkpoint to go on from; start a new run without --resume") from error
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise InputError(f"the checkpoint in {folder} does not fit this version: {error}") from error
+    except (OSError, EOFError, KeyError, ValueError, RuntimeError, UnpicklingError) as error:
+        raise InputError(f"the checkpoint in {folder} cannot be read, or does not fit this version: {error}") from error
     buffer.pos, buffer.full = plain["buffer_position"], plain["buffer_full"]
     model.num_timesteps, model._n_updates = plain["timesteps"], plain["updates"]
     buffer.random.bit_generator.state = plain["buffer_random"]

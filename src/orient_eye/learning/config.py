@@ -1,5 +1,6 @@
 """What a training run is: every choice in one frozen dataclass, resolved before anything starts."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
@@ -78,7 +79,7 @@ class TrainConfig:
     reward_scale: Annotated[Literal["log", "raw"] | None, _default("log; thesis raw")] = None
     """Learn on the logarithm of the reward, which has the same optimal policy, or on the reward itself."""
     device: str = "cpu"
-    """Where the networks live: cpu, or cuda."""
+    """Where the networks live: cpu, cuda, or cuda:NUMBER."""
     evaluation_pairs: Annotated[int | None, _default("300 on lpf, 60 on other plants")] = None
     """Random saccades held against the searched optimum."""
     seed: int = 0
@@ -106,15 +107,26 @@ class TrainConfig:
                 raise InputError(f"--{name.replace('_', '-')} must be at least 1, got {getattr(config, name)}")
         for name in ("learning_rate", "last_learning_rate", "temperature"):
             value = getattr(config, name)
-            if value != "auto" and not min(value if isinstance(value, tuple) else (value,)) > 0:
-                raise InputError(f"--{name.replace('_', '-')} must be positive, got {value}")
+            numbers = value if isinstance(value, tuple) else (value,)
+            if value != "auto" and not all(0 < number < math.inf for number in numbers):
+                raise InputError(f"--{name.replace('_', '-')} must be positive and finite, got {value}")
+        assert config.last_learning_rate
+        if config.last_learning_rate > 1:
+            raise InputError(f"--last-learning-rate is a share, at most 1, got {config.last_learning_rate}")
         if config.seed < 0:
             raise InputError(f"--seed must not be negative, got {config.seed}")
-        if config.device.startswith("cuda"):
-            import torch
-
-            if not torch.cuda.is_available():
-                raise InputError(f"--device {config.device}: this machine or this build of torch has no CUDA; use cpu")
-        elif config.device != "cpu":
-            raise InputError(f"--device is cpu or cuda, got {config.device!r}")
+        _check_device(config.device)
         return config
+
+
+def _check_device(name: str) -> None:
+    kind, _, number = name.partition(":")
+    if kind not in ("cpu", "cuda") or (number and not number.isdecimal()):
+        raise InputError(f"--device is cpu, cuda or cuda:NUMBER, got {name!r}")
+    if kind == "cuda":
+        import torch
+
+        if int(number or 0) >= torch.cuda.device_count():
+            raise InputError(
+                f"--device {name}: torch sees {torch.cuda.device_count()} CUDA devices on this machine; use cpu"
+            )

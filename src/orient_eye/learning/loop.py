@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
 from orient_eye.environment import SaccadeVecEnv, observe, to_action
+from orient_eye.errors import InputError
 from orient_eye.files import write_table
 from orient_eye.learning.checkpoint import save_checkpoint
 from orient_eye.learning.evaluation import Yardstick
@@ -32,11 +33,6 @@ class Stop(Exception):
 
 class TrainingLoop(BaseCallback):
     """Progress, metrics, stages and checkpoints, always between two updates."""
-
-    _FIELDS = (
-        "update", "saccades", "elapsed_s", "reward_mean", "gap_mean", "gap_p95", "temperature", "q_loss", "policy_loss",
-        "failed",
-    )  # fmt: skip
 
     def __init__(
         self,
@@ -87,12 +83,19 @@ class TrainingLoop(BaseCallback):
     def _between_updates(self) -> None:
         n = self.algorithm._n_updates
         self.elapsed = time.monotonic() - self.began
+        if not self.algorithm.finite():
+            raise InputError(
+                f"the training diverged at update {n}: the networks hold numbers that are not finite; "
+                "start a new run with a smaller --learning-rate"
+            )
         if n % self.every == 0 and n != self.evaluated:
             self._evaluate(n)
         if n % 10 == 0 and self.rows:
             speed = (n - self.done_before) / max(time.monotonic() - self.resumed, 1e-9)
             row = self.rows[-1]
             note = f"reward {row['reward_mean']:.3g}  gap {100 * row['gap_mean']:.2f} %  {speed:.0f} updates/s"
+            if self.failed:
+                note += f"  [red]{self.failed} saccades failed[/red]"
             self.bar.update(self.job, completed=n, note=note)
         if self.ctrl_c.pressed:
             self._save()
@@ -102,7 +105,9 @@ class TrainingLoop(BaseCallback):
 
     def finish(self) -> None:
         """The last evaluation and checkpoint."""
-        self._between_updates()
+        self.elapsed = time.monotonic() - self.began
+        if self.evaluated != self.updates:
+            self._evaluate(self.updates)
         self._save()
 
     def _save(self) -> None:
@@ -138,7 +143,7 @@ class TrainingLoop(BaseCallback):
         self.evaluated = n
         self._write_metrics()
         for stage in STAGES:
-            if n == self.every * round(stage * self.updates / self.every) or (stage == 1 and n == self.updates):
+            if n == (self.updates if stage == 1 else self.every * round(stage * self.updates / self.every)):
                 self._record_stage(stage)
 
     def _record_stage(self, stage: float) -> None:
@@ -158,8 +163,8 @@ class TrainingLoop(BaseCallback):
         if not hasattr(self, "writer"):
             self.writer = SummaryWriter(str(self.folder / "tensorboard"))
         row = self.rows[-1]
-        for name in self._FIELDS[3:]:
-            self.writer.add_scalar(name, row[name], int(row["update"]))
+        for name, value in row.items():
+            self.writer.add_scalar(name, value, int(row["update"]))
         self.writer.flush()
 
 

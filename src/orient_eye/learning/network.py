@@ -1,9 +1,9 @@
 """Forward and backward passes of a small ReLU network, written out.
 
 The networks of a saccade policy are so small that autograd's bookkeeping costs more than their arithmetic.
-These passes read the parameters of ordinary torch layers and write into their `.grad`, so that checkpoints
-and SB3's own code see nothing unusual; a test holds them against autograd. For the same reason the
-parameters of a network lie in one vector, which an optimizer moves in one call.
+These passes read the parameters of ordinary torch layers and write into their `.grad`; a test holds them
+against autograd. For the same reason the parameters of a network lie in one vector, of which the layers'
+are views and which an optimizer moves in one call.
 """
 
 from collections.abc import Iterable
@@ -11,6 +11,8 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor, nn
 from torch.optim.adam import adam
+
+from orient_eye.errors import InputError
 
 
 def flatten(parameters: Iterable[nn.Parameter]) -> nn.Parameter:
@@ -39,8 +41,7 @@ def take_step(optimizer: torch.optim.Optimizer) -> None:
     state = optimizer.state[vector]
     moments = [state["exp_avg"]], [state["exp_avg_sq"]], [state["max_exp_avg_sq"]] if group["amsgrad"] else []
     beta1, beta2 = group["betas"]
-    names = ("lr", "weight_decay", "eps", "amsgrad", "maximize", "fused", "foreach")
-    settings = {name: group[name] for name in names}
+    settings = {name: value for name, value in group.items() if name not in ("params", "betas")}
     adam([vector], [vector.grad], *moments, [state["step"]], beta1=beta1, beta2=beta2, **settings)
 
 
@@ -57,7 +58,7 @@ class Network:
         expected = [nn.ReLU if i % 2 else nn.Linear for i in range(len(modules) | 1)]
         if [type(module) for module in modules] != expected:
             names = [type(module).__name__ for module in modules]
-            raise TypeError(f"linear layers with ReLU between them, got {names}")
+            raise InputError(f"these are linear layers with ReLU between them only, got {names}")
         self.layers = [(layer.weight, layer.bias) for layer in modules if isinstance(layer, nn.Linear)]
 
     def forward(self, x: Tensor) -> list[Tensor]:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically
@@ -26,7 +25,6 @@ from orient_eye.saccade import YAW_RANGE_DEG, SaccadeTask
 if TYPE_CHECKING:
     import onnx
 
-Array = NDArray[np.float64]
 _OPSET, _IR_VERSION = 17, 8  # read by onnxruntime 1.13 and later
 _NO_SPREAD = -20.0  # log of the standard deviation, SB3's least
 
@@ -232,17 +230,22 @@ def import_sb3(path: str | Path, task: SaccadeTask) -> Policy:
     return Policy(weights, biases, task.action_low, task.action_high, manifest)
 
 
+def _class_name(written: Any) -> str:
+    """The name of a class as SB3 writes it down: "<class 'torch.nn.modules.activation.ReLU'>"."""
+    return str(written).removesuffix("'>").rsplit(".", 1)[-1]
+
+
 def _refuse_other_networks(words: dict[str, Any], actor: dict[str, Any]) -> None:
     """Networks whose action would not come out the same.
 
     SB3 writes beside each pickle what is in it, in words: these are read, the pickle is not.
     """
     settings = words.get("policy_kwargs") or {}
-    activation = str(settings.get("activation_fn", "ReLU"))
-    if "ReLU" not in activation or "LeakyReLU" in activation:
+    activation = _class_name(settings.get("activation_fn", "ReLU"))
+    if activation != "ReLU":
         raise InputError(f"a policy file holds networks of ReLU layers, these have {activation}")
-    features = str(settings.get("features_extractor_class", "FlattenExtractor"))
-    if not any(known in features for known in ("FlattenExtractor", "GazeFeatures")):
+    features = _class_name(settings.get("features_extractor_class", "FlattenExtractor"))
+    if features not in ("FlattenExtractor", "GazeFeatures"):
         raise InputError(f"a policy file's networks see the observation or GazeFeatures of it, these {features}")
     if words.get("use_sde") is not False:
         raise InputError("a policy file holds no state-dependent exploration (use_sde); train without it")

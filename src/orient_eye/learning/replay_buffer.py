@@ -42,6 +42,7 @@ class OneStepReplayBuffer(ReplayBuffer):
         self.observation_space, self.action_space = observation_space, action_space
         self.device = get_device(device)
         self.n_envs = n_envs
+        self.handle_timeout_termination = False  # SB3 asks when a buffer is loaded
         self.random = np.random.default_rng(seed)
         # One float32 row a saccade: observation, action, reward.
         self.observation_size, self.action_size = observation_space.shape[0], action_space.shape[0]
@@ -74,9 +75,13 @@ class OneStepReplayBuffer(ReplayBuffer):
         self.pos = (self.pos + len(new)) % self.buffer_size
 
     def sample(self, batch_size: int, env: VecNormalize | None = None) -> ReplayBufferSamples:
-        """Saccades drawn uniformly, with replacement."""
+        """Saccades drawn uniformly, with replacement, normalised where `env` does so."""
         drawn = self.random.integers(self.size(), size=batch_size)
-        rows = torch.from_numpy(self.rows.take(drawn, axis=0)).to(self.device)
+        taken = self.rows.take(drawn, axis=0)
+        if env is not None:
+            taken[:, : self.observation_size] = np.asarray(env.normalize_obs(taken[:, : self.observation_size]))
+            taken[:, -1] = env.normalize_reward(taken[:, -1])
+        rows = torch.from_numpy(taken).to(self.device)
         observations = rows[:, : self.observation_size]
         actions = rows[:, self.observation_size : -1]
         rewards = rows[:, -1:]

@@ -17,6 +17,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch import Tensor, nn
 
+from orient_eye.errors import InputError
 from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.saccade import YAW_RANGE_DEG
 
@@ -61,22 +62,34 @@ def falling_temperature(first: float = 1.0, last: float = 1e-3, until: float = 0
 class OneStepSAC(SAC):
     """SAC whose episodes are one step long.
 
+    Its zips are loaded by `OneStepSAC.load`; those of stock SAC have another optimizer (`import_sb3` reads
+    the policy of either).
+
     Args:
-        policy: as in SAC.
+        policy: as in SAC: networks of ReLU layers, with features that learn nothing.
         env: as in SAC; every step must end its episode.
-        temperature: entropy temperature, a function of the remaining share of training; None for SB3's
-            automatic rule.
+        temperature: entropy temperature, a function of the remaining share of training; None for `ent_coef`,
+            as in SAC.
         settings: the other keywords of SAC.
+
+    Raises:
+        InputError: two temperatures, or networks whose gradients are not written out here.
     """
 
     def __init__(self, policy: Any, env: Any, *, temperature: Schedule | None = None, **settings: Any) -> None:
         self.temperature = temperature
         if temperature is not None:
+            if "ent_coef" in settings:
+                raise InputError("give temperature or ent_coef, not both")
             settings["ent_coef"] = temperature(1.0)
         super().__init__(policy, env, **settings)
 
     def _create_aliases(self) -> None:
         super()._create_aliases()
+        if self.use_sde:
+            raise InputError("OneStepSAC has no state-dependent exploration: leave use_sde out")
+        if any(True for _ in self.actor.features_extractor.parameters()):
+            raise InputError("OneStepSAC does not train a features extractor: give one without parameters")
         heads = cast(nn.Linear, self.actor.mu), cast(nn.Linear, self.actor.log_std)
         head = nn.Linear(heads[0].in_features, 2 * heads[0].out_features, device=self.device)
         for name in ("weight", "bias"):
@@ -106,7 +119,7 @@ class OneStepSAC(SAC):
         torch.set_flush_denormal(True)
         for _ in range(gradient_steps):
             assert self.replay_buffer is not None
-            data = self.replay_buffer.sample(batch_size)
+            data = self.replay_buffer.sample(batch_size, env=self._vec_normalize_env)
             with torch.no_grad():
                 features = self.actor.extract_features(data.observations, self.actor.features_extractor)
                 q_loss = q_loss + self._update_q(features, data.actions, data.rewards)
@@ -163,6 +176,11 @@ class OneStepSAC(SAC):
         self._policy.backward(outputs, by_outputs, of_parameters=True, of_input=False)
         take_step(self.actor.optimizer)
         return -(temperature * entropy + value.sum() / n), temperature
+
+    def finite(self) -> bool:
+        """Whether the parameters of both networks are finite numbers."""
+        vectors = [part.optimizer.param_groups[0]["params"][0] for part in (self.actor, self.critic)]
+        return all(bool(vector.sum().isfinite()) for vector in vectors)
 
     def _temperature_step(self, entropy: Tensor) -> Tensor:
         """The temperature of this update; under SB3's automatic rule it learns first."""

@@ -7,6 +7,7 @@ evaluation.json (the searched optimum), stages/ (evaluation saccades at several 
 policy.npz and policy.json, result.json, learning.png, policy.png and recording.rrd.
 """
 
+import warnings
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from stable_baselines3.common.logger import Logger
 
 from orient_eye.environment import SaccadeVecEnv
 from orient_eye.errors import InputError
+from orient_eye.learning.checkpoint import NAME as CHECKPOINT
 from orient_eye.learning.checkpoint import load_checkpoint
 from orient_eye.learning.config import TrainConfig
 from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluation_saccades, gap_summary
@@ -25,7 +27,7 @@ from orient_eye.learning.loop import CHECKPOINT_S, CtrlC, Stop, TrainingLoop, pr
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
-from orient_eye.plants import Plant, make_plant
+from orient_eye.plants import Plant, chosen_plant
 from orient_eye.reward import Weights
 from orient_eye.run_directory import RunDirectory, versions
 from orient_eye.saccade import SaccadeTask
@@ -72,26 +74,38 @@ def train(
 def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOINT_S) -> dict[str, Any]:
     """Go on with a run that was stopped, to the numbers it would have had.
 
+    From its checkpoint, or from the beginning where it was stopped before the first one.
+
     Raises:
         InputError: no run, or nothing to go on from.
         Interrupted: Ctrl-C.
     """
     run = RunDirectory(folder)
     description = run.read_json("run.json")
-    if description.get("command") != "train":
-        raise InputError(f"{folder} is a run of {description.get('command')!r}, not of train")
-    settings: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in description["config"].items()}
-    config = TrainConfig(**settings)
+    command = description.get("command") if isinstance(description, dict) else None
+    if command != "train":
+        raise InputError(f"{folder} is a run of {command!r}, not of train")
+    try:
+        settings: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in description["config"].items()
+        }
+        config = TrainConfig(**settings)
+    except (AttributeError, KeyError, TypeError) as error:
+        raise InputError(f"run.json in {folder} is not of this version of orient-eye: {error}") from error
+    config = config.resolved()
+    changed = {name: was for name, was in description.get("versions", {}).items() if versions().get(name) != was}
+    if changed:
+        warnings.warn(f"not the numbers it would have had: the run began with {changed}", stacklevel=2)
     if (folder / "result.json").exists():
         raise InputError(f"{folder} is finished: its result is in result.json; start a new run without --resume")
     surrogate = folder / "surrogate.json"
     plant = _plant(config, surrogate if surrogate.exists() else None)
-    return _Run(config, run, plant, checkpoint_s).execute(resume=True, quiet=quiet)
+    begun = (folder / CHECKPOINT).exists()
+    return _Run(config, run, plant, checkpoint_s).execute(resume=begun, quiet=quiet)
 
 
 def _plant(config: TrainConfig, surrogate: Path | None = None) -> Plant:
-    options = {"surrogate": surrogate or config.surrogate} if config.plant == "lpf" else {"eye": config.eye}
-    return make_plant(config.plant, **options)
+    return chosen_plant(config.plant, surrogate or config.surrogate, config.eye)
 
 
 def _task(config: TrainConfig, plant: Plant) -> SaccadeTask:
@@ -125,19 +139,19 @@ class _Run:
         model = self._model(env, seed=networks, buffer_seed=buffer)
         env.seed(saccades)  # SB3 has given both the seed of the networks
         model.action_space.seed(actions)
-        with progress_bar(quiet) as bar, CtrlC() as ctrl_c:
+        with progress_bar(quiet) as bar:
             yardstick, table = self._yardsticks(bar)
-            loop = TrainingLoop(folder, env, config.updates, yardstick, table, bar, ctrl_c, self.checkpoint_s)
-            if resume:
-                extra = load_checkpoint(folder, model, env)
-                loop.go_on(extra)
-            total = (self._warmup_steps() + config.updates) * env.num_envs
-            try:
-                left = total - model.num_timesteps
-                model.learn(left, callback=loop, log_interval=10**9, reset_num_timesteps=not resume)
-            except Stop:
-                raise Interrupted(folder) from None
-            loop.finish()
+            with CtrlC() as ctrl_c:
+                loop = TrainingLoop(folder, env, config.updates, yardstick, table, bar, ctrl_c, self.checkpoint_s)
+                if resume:
+                    loop.go_on(load_checkpoint(folder, model, env))
+                total = (self._warmup_steps() + config.updates) * env.num_envs
+                try:
+                    left = total - model.num_timesteps
+                    model.learn(left, callback=loop, log_interval=10**9, reset_num_timesteps=not resume)
+                except Stop:
+                    raise Interrupted(folder) from None
+                loop.finish()
         return self._conclude(model, yardstick, table, loop)
 
     def _warmup_steps(self) -> int:

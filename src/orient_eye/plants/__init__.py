@@ -8,6 +8,7 @@ members and put it in that table: environment, trainer, sysid and command line t
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -110,6 +111,23 @@ def make_plant(name: str, **options: Any) -> Plant:
     if name not in PLANTS:
         raise InputError(f"unknown plant {name!r}; choose one of {', '.join(PLANTS)}")
     return PLANTS[name](**options)
+
+
+def chosen_plant(name: str, surrogate: str | Path, eye: str) -> Plant:
+    """The plant that the options --plant, --surrogate and --eye choose.
+
+    Args:
+        name: one of `PLANTS`.
+        surrogate: for lpf: a file, or the name of a shipped one.
+        eye: for the others: preset of the eye.
+
+    Raises:
+        InputError: unknown, or an option that does nothing on this plant.
+    """
+    option, given = ("--eye", eye) if name == "lpf" else ("--surrogate", surrogate)
+    if given != "thesis":
+        raise InputError(f"{option} does nothing on plant {name!r}; leave it out or choose another plant")
+    return make_plant(name, surrogate=surrogate) if name == "lpf" else make_plant(name, eye=eye)
 
 
 def plant_in_words(identity: dict[str, Any]) -> str:
