@@ -17,7 +17,7 @@ def _default(words: str) -> Any:
 _PRESETS: dict[str, dict[str, Any]] = {
     "ours": {
         "updates": 14_000,
-        "batch_size": 512,
+        "batch_size": 1024,
         "replay_size": 300_000,
         "warmup": 2048,
         "learning_rate": 1e-3,
@@ -63,7 +63,7 @@ class TrainConfig:
     """Updates of the networks."""
     saccades_per_update: Annotated[int | None, _default("128 on lpf, 32 on other plants; thesis 1")] = None
     """Fresh saccades before each update."""
-    batch_size: Annotated[int | None, _default("512; thesis 8196")] = None
+    batch_size: Annotated[int | None, _default("1024; thesis 8196")] = None
     """Saccades an update learns from."""
     replay_size: Annotated[int | None, _default("300000; thesis 30000")] = None
     """Saccades the replay buffer holds."""
