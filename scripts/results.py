@@ -3,8 +3,8 @@
     python scripts/results.py runs/results                  # hours of one core; runs that are done are kept
     python scripts/results.py runs/results --plants lpf --cases 1 --seeds 0
 
-Every run is `orient-eye train` with its defaults. Prints the table of docs/learning.md, and with --ship copies
-the best run of each case into models/policies.
+Every run is `orient-eye train` with its defaults. Prints the tables of README.md and docs/learning.md; with
+--write puts them there, and with --ship the best run of each case into models/policies.
 """
 
 import concurrent.futures
@@ -20,9 +20,11 @@ import numpy as np
 import tyro
 
 from orient_eye.cases import CASES
+from orient_eye.files import write_text
 from orient_eye.learning.policy import Policy
 
-POLICIES = Path(__file__).resolve().parents[1] / "models" / "policies"
+ROOT = Path(__file__).resolve().parents[1]
+BEGIN, END = "<!-- scripts/results.py -->", "<!-- end -->"
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class Results:
     """Of the runs."""
     parallel: int = 2
     """Runs on lpf at a time, one core each."""
+    write: bool = False
+    """Put the tables into README.md and docs/learning.md."""
     ship: bool = False
     """Copy the best run of each case into models/policies."""
 
@@ -51,7 +55,11 @@ def main(options: Results) -> None:
     if "mujoco" in options.plants:  # one at a time: this plant uses all cores
         for seed in options.seeds:
             run(options.folder, "mujoco", "1", seed)
-    print(table(options.folder))
+    tables = {"README.md": short_table(options.folder), "docs/learning.md": table(options.folder)}
+    for name, text in tables.items():
+        print(f"{name}:\n\n{text}\n")
+        if options.write:
+            write(ROOT / name, text)
     if options.ship:
         ship(options.folder)
 
@@ -106,12 +114,27 @@ def table(folder: Path) -> str:
     return "\n".join(lines)
 
 
+def short_table(folder: Path) -> str:
+    """Gaps alone."""
+    lines = ["| plant | case | mean gap, each seed | 95th percentile |", "|---|---|---|---|"]
+    for (plant, case), runs in results(folder).items():
+        mean, high = (", ".join(f"{100 * run[key]:.2f} %" for run in runs) for key in ("gap_mean", "gap_p95"))
+        lines.append(f"| {plant} | {case} | {mean} | {high} |")
+    return "\n".join(lines)
+
+
+def write(path: Path, text: str) -> None:
+    """Put a table in place of the one between the marks of a Markdown file."""
+    before, rest = path.read_text(encoding="utf-8").split(BEGIN)
+    write_text(path, f"{before}{BEGIN}\n{text}\n{END}{rest.split(END, 1)[1]}")
+
+
 def ship(folder: Path) -> None:
     """Write the policy with the smallest mean gap of each case into models/policies."""
     for (plant, case), runs in results(folder).items():
         best = runs[int(np.argmin([run["gap_mean"] for run in runs]))]["folder"]
         policy = Policy.load(best)
-        policy.save(POLICIES / f"{plant}-{case}")
+        policy.save(ROOT / "models" / "policies" / f"{plant}-{case}")
         print(f"models/policies/{plant}-{case}: from {best.name}", file=sys.stderr)
 
 
