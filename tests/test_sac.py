@@ -29,9 +29,8 @@ def make_model(env: VecEnv, critics: int = 1, **settings: object) -> OneStepSAC:
         train_freq=1,
         gradient_steps=1,
         seed=0,
-        device="cpu",
         policy_kwargs={"net_arch": [16, 8], "features_extractor_class": GazeFeatures, "n_critics": critics},
-        **{"temperature": falling_temperature(), **settings},
+        **{"temperature": falling_temperature(), "device": "cpu", **settings},
     )
     model.set_logger(Logger(folder=None, output_formats=[]))
     return model
@@ -88,13 +87,20 @@ def test_step_of_a_flat_vector_is_that_of_torchs_adam(settings: dict[str, Any]) 
         torch.testing.assert_close(mine, other)
 
 
+DEVICES = [
+    "cpu",
+    pytest.param("cuda", marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU")),
+]
+
+
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("critics", [1, 2])
-def test_update_is_that_of_autograd_on_sb3s_own_networks(env: SaccadeVecEnv, critics: int) -> None:
-    model = make_model(env, critics)
+def test_update_is_that_of_autograd_on_sb3s_own_networks(env: SaccadeVecEnv, critics: int, device: str) -> None:
+    model = make_model(env, critics, device=device)
     model.learn(64)
     assert model.replay_buffer is not None
     data = model.replay_buffer.sample(64)
-    temperature = torch.tensor(0.3)
+    temperature = torch.tensor(0.3, device=device)
     model.ent_coef_tensor = temperature
     features = model.actor.extract_features(data.observations, model.actor.features_extractor)
     # Autograd, through SB3's own critic and squashed Gaussian.
