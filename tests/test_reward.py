@@ -15,7 +15,7 @@ from scipy.optimize import differential_evolution
 
 from orient_eye.errors import InputError
 from orient_eye.measures import Measures, measure
-from orient_eye.optimum import Optimum, find_optimum
+from orient_eye.optimum import Optimum, _scan, find_optimum
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.pulse_step import FIXED_C, PulseStep, varying_C
@@ -237,6 +237,24 @@ def test_actions_of_the_table_cost_what_it_says() -> None:
     np.testing.assert_allclose(cost, TABLE_COST, rtol=0, atol=0.5)
 
 
+def test_scans_leave_a_basin_that_is_not_the_best() -> None:
+    """Case 2-varying: B = 70 is 2.3 % short; differential evolution alone stopped there once in some hundreds."""
+    task = SaccadeTask.of_case(TASK.plant, "2-varying")
+    start, target = task.fixate(horizontal([-13.911318])), horizontal([14.538076])
+    low, high = task.action_low, task.action_high
+
+    def judge(x: Array) -> Array:
+        many = np.zeros(x.shape[1], int)
+        return task.perform(start[many], (low + x[0, :, None] * (high - low)), target[many]).reward.total[None]
+
+    stuck = ((np.array([[70.12327804, 9.81393982, 17.50011878]]) - low) / (high - low))[None]
+    x, value = _scan(np.tile(stuck, (1, 48, 1)), np.zeros((1, 48)), judge, lambda done: None)
+    best = find_optimum(task, start, target, np.random.default_rng(0)).reward[0]
+    assert judge(stuck)[0, 0] < best * 1.02
+    assert value.max() == pytest.approx(best, rel=2e-3)
+    assert judge(x).max() == value.max()
+
+
 def test_the_search_finds_the_table() -> None:
     """The cost is flat in B near its optimum: 0.2 in B is 1e-5 of it, which is the table's own search."""
     found = table_optimum()
@@ -325,7 +343,7 @@ def test_same_generator_same_optimum() -> None:
     one, same, other = search(5), search(5), search(6)
     np.testing.assert_array_equal(one.action, same.action)
     np.testing.assert_array_equal(one.reward, same.reward)
-    assert (one.action != other.action).all()
+    assert (one.action != other.action).any()
 
 
 def test_the_search_on_mujoco() -> None:
@@ -346,8 +364,9 @@ def test_search_options() -> None:
     shares: list[float] = []
     options = {"population": 12, "generations": 4}
     found = find_optimum(TASK, start, target, np.random.default_rng(0), progress=shares.append, **options)
-    assert shares == [0.25, 0.5, 0.75, 1.0]
-    assert found.evaluations == 12 * (1 + 4)
+    rounds = 4 + 5 * 3  # generations, and scans of five widths along three coordinates
+    assert shares == [(i + 1) / rounds for i in range(rounds)]
+    assert found.evaluations == 12 * (1 + rounds)
     for population in (37, 9, 0):
         with pytest.raises(InputError, match=f"multiple of 3, at least 12, got {population}"):
             find_optimum(TASK, start, target, np.random.default_rng(0), population=population)

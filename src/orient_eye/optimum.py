@@ -1,10 +1,11 @@
 """The best action for a saccade, by search: the yardstick for everything learned.
 
-Differential evolution over the box of actions, for many saccades side by side, so that every generation
-is one batch of the plant. It needs no gradient, so that neither the cliff of the reward in k0 (an
-overshoot costs decades) nor the kink of the settling time misleads it.
+Differential evolution over the box of actions and scans along its coordinates at the end, for many saccades
+side by side, so that every step is one batch of the plant. It needs no gradient, so that neither the cliff of
+the reward in k0 (an overshoot costs decades) nor the kink of the settling time misleads it.
 """
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 _ISLANDS = 3
 _RESTARTS = {0.3: 1.0, 0.55: 0.3, 0.8: 0.1}  # share of the generations: spread around the best
 _NEAR = (0.05, 0.002, 0.03)  # in B, D and k0, shares of their ranges
+_SCANS = (1.0, 0.2, 0.04, 0.008, 0.0016)  # half-widths of the scans at the end, shares of the ranges
 
 
 @dataclass(frozen=True)
@@ -82,9 +84,10 @@ def find_optimum(
     mates = np.array([np.flatnonzero(island == i) for i in island])
     each, columns = np.arange(saccades)[:, None], np.arange(population)
     restarts = {round(share * generations): spread for share, spread in _RESTARTS.items()}
+    rounds = generations + len(_SCANS) * low.size
     for generation in range(generations):
         if progress:
-            progress((generation + 1) / generations)
+            progress((generation + 1) / rounds)
         best = np.take_along_axis(mates[None], value[:, mates].argmax(axis=2)[..., None], axis=2)[..., 0]
         if generation in restarts:
             near = np.tile(_NEAR, driven) * restarts[generation]
@@ -103,9 +106,36 @@ def find_optimum(
         trial_value = judge(trial)
         better = trial_value >= value
         x, value = np.where(better[..., None], trial, x), np.where(better, trial_value, value)
+    x, value = _scan(x, value, judge, lambda done: progress and progress((generations + done) / rounds))
     winner = value.argmax(axis=1)
     action = low + x[np.arange(saccades), winner] * (high - low)
-    return Optimum(action.reshape(saccades, driven, 3), value.max(axis=1), saccades * population * (generations + 1))
+    return Optimum(action.reshape(saccades, driven, 3), value.max(axis=1), saccades * population * (rounds + 1))
+
+
+def _scan(
+    x: Array, value: Array, judge: Callable[[Array], Array], progress: Callable[[int], object]
+) -> tuple[Array, Array]:
+    """Scan from the best candidates along one coordinate at a time, the widest scans first.
+
+    The way out where all islands have settled in a basin that is not the best.
+
+    Args:
+        x: candidates in the unit box, (saccades, population, size).
+        value: of the candidates, (saccades, population).
+        judge: gives the value of candidates.
+        progress: called with the number of scans done.
+
+    Returns:
+        The candidates of the last scan and their values.
+    """
+    _, population, size = x.shape
+    offsets = np.concatenate([[0.0], np.linspace(-1, 1, population - 1)])
+    for done, (width, coordinate) in enumerate(itertools.product(_SCANS, range(size)), start=1):
+        x = np.repeat(np.take_along_axis(x, value.argmax(axis=1)[:, None, None], axis=1), population, axis=1)
+        x[..., coordinate] = np.clip(x[..., coordinate] + width * offsets, 0, 1)
+        value = judge(x)
+        progress(done)
+    return x, value
 
 
 def _spread(random: np.random.Generator, shape: tuple[int, int, int]) -> Array:

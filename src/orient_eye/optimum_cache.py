@@ -22,7 +22,7 @@ from orient_eye.optimum import Optimum, find_optimum
 from orient_eye.saccade import SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
-_SEARCH = "differential evolution 1"  # changes when the search does
+_SEARCH = "differential evolution 2"  # changes when the search does
 _SEED = 20_210
 
 
