@@ -141,7 +141,7 @@ def test_elastics_are_those_of_the_author(preset: str) -> None:
 
 def linearised(plant: Plant) -> tuple[Array, Array]:
     """Restoring stiffness about x, y, z and torque per motor [N m/rad], both (3, 3), at rest."""
-    torque, step, still = plant._torque, 1e-6, np.zeros((3, 3))  # type: ignore[attr-defined]
+    torque, step, still = plant._torque, 1e-6, np.zeros((3, 3))
     forward = np.tile([1.0, 0, 0, 0], (3, 1))
     turned = [Rotation.from_rotvec(sign * step * np.eye(3)).as_quat(scalar_first=True) for sign in (1, -1)]
     moved = [np.rad2deg(sign * step * np.eye(3)) for sign in (1, -1)]

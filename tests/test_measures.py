@@ -1,7 +1,6 @@
 """Measures of a saccade: the closed form, the sampled form, and dense sampling as a witness of both."""
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -408,8 +407,7 @@ def test_overshoot_counts_only_along_the_saccade() -> None:
 def test_mujoco_settles_where_the_equilibrium_is() -> None:
     """The settled end of a simulated saccade is `rest_orientation`, so that either may be the final one."""
     plant = MujocoPlant(threads=1)
-    step: Callable[[float], Array] = lambda angle: np.tile([0.0, angle, 0.0], (1, 1501, 1))  # noqa: E731
-    trajectory = plant.simulate(step(14.0), EyeState(FORWARD[None]))
+    trajectory = plant.simulate(np.tile([0.0, 14.0, 0.0], (1, 1501, 1)), EyeState(FORWARD[None]))
     rest = plant.rest_orientation(np.array([[0.0, 14.0, 0.0]]))
     by_end, by_rest = measure(trajectory), measure(trajectory, rest)
     for name in SCALARS:

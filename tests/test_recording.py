@@ -126,7 +126,7 @@ def test_curves_are_the_trajectory_exactly(saccades: Trajectory, recorded: Path)
             ("angle/yaw", saccades.yaw_deg[k]),
             ("velocity/z", saccades.angular_velocity[k, :, 2]),
             ("motor/motor2", saccades.motor[k, :, 1]),
-            ("tension", saccades.tension[k]),  # type: ignore[index]
+            ("tension", saccades.tension[k]),
         ):
             time, values = scalars(recorded, f"{root}/{entity}")
             np.testing.assert_allclose(time, saccades.time, atol=1e-9)

@@ -3,7 +3,6 @@ program, and searches by other means.
 """
 
 import functools
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -337,9 +336,10 @@ def test_no_random_action_is_better() -> None:
 
 def test_same_generator_same_optimum() -> None:
     start, target = random_pairs(4)
-    search: Callable[[int], Optimum] = lambda seed: find_optimum(  # noqa: E731
-        TASK, start, target, np.random.default_rng(seed), population=12, generations=6
-    )
+
+    def search(seed: int) -> Optimum:
+        return find_optimum(TASK, start, target, np.random.default_rng(seed), population=12, generations=6)
+
     one, same, other = search(5), search(5), search(6)
     np.testing.assert_array_equal(one.action, same.action)
     np.testing.assert_array_equal(one.reward, same.reward)

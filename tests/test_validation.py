@@ -82,7 +82,7 @@ def test_the_error_shrinks_with_the_step() -> None:
     errors = []
     for step_s in (0.001, 0.0002):
         plant = MujocoPlant(threads=1)
-        plant.step_s = step_s  # type: ignore[misc]
+        plant.step_s = step_s
         plant.model.opt.timestep = step_s
         for motor in plant.motors:
             actuator = plant.model.actuator(motor)

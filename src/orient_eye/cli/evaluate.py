@@ -43,7 +43,7 @@ class Evaluate:
         from dataclasses import asdict
 
         from orient_eye.cli import say
-        from orient_eye.cli.train import learned_table
+        from orient_eye.cli.train import say_result
         from orient_eye.errors import InputError
         from orient_eye.learning.policy import Policy
         from orient_eye.plants.lpf import LowPassPlant
@@ -67,13 +67,7 @@ class Evaluate:
         _draw(policy, pairs, table, run.path)
         _record(policy, table, run.path / "recording.rrd")
         run.write_json("result.json", result)
-        say(learned_table(result))
-        say(
-            f"mean reward gap to the searched optimum over {count} random saccades: "
-            f"{100 * result['gap_mean']:.2f} % (95th percentile {100 * result['gap_p95']:.2f} %)"
-        )
-        if result["failed_saccades"]:
-            say(f"[red]{result['failed_saccades']} simulated saccades failed and got the worst reward[/red]")
+        say_result(result)
         mean, most = (result[f"yaw_error_{name}_deg"] for name in ("mean", "max"))
         say(f"final yaw off by {mean:.3f} deg in the mean, {most:.3f} deg at most")
         say(f"in {run.path}: result.json, pairs.csv, figure_5_*.png, recording.rrd")
@@ -138,15 +132,14 @@ def _draw(policy: "Policy", pairs: "Yardstick", table: "Yardstick", folder: Path
 
 def _record(policy: "Policy", table: "Yardstick", path: Path) -> None:
     """The table's saccades, the searched optimum beside them."""
-    from orient_eye.eye import build_model
     from orient_eye.plants import plant_in_words
-    from orient_eye.recording import record
+    from orient_eye.recording import model_of, record
 
     task = table.task
     record(
         path,
         task.trajectory(table.start, policy.act(table.start.orientation, table.target)),
-        model=build_model(task.plant.identity().get("eye", "thesis")),
+        model=model_of(task.plant.identity()),
         target=table.target,
         titles=[f"{a:g} deg" for a in table.target_yaw_deg - table.start_yaw_deg],
         reference=task.trajectory(table.start, table.optimum.action),

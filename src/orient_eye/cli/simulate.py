@@ -37,11 +37,10 @@ class Simulate:
         import numpy as np
 
         from orient_eye.cli import say
-        from orient_eye.eye import build_model
         from orient_eye.figures import draw_trajectory
         from orient_eye.motor_file import read_command, rest_position
         from orient_eye.plants import make_plant
-        from orient_eye.recording import record
+        from orient_eye.recording import model_of, record
         from orient_eye.rotations import to_euler
         from orient_eye.run_directory import RunDirectory
         from orient_eye.trajectory import EyeState
@@ -63,7 +62,7 @@ class Simulate:
         record(
             run.path / "trajectory.rrd",
             trajectory,
-            model=build_model(self.eye if self.plant != "lpf" else "thesis"),
+            model=model_of(plant.identity()),
             titles=[self.motor.stem],
             notes=f"`{self.motor.name}` on plant `{self.plant}`.",
         )

@@ -45,16 +45,23 @@ class Train:
         except Interrupted as stopped:
             say(str(stopped))
             raise SystemExit(130) from None
-        say(learned_table(result))
-        say(
-            f"mean reward gap to the searched optimum over {result['pairs']} random saccades: "
-            f"{100 * result['gap_mean']:.2f} % (95th percentile {100 * result['gap_p95']:.2f} %)"
-        )
-        if result["failed_saccades"]:
-            say(f"[red]{result['failed_saccades']} simulated saccades failed and got the worst reward[/red]")
+        say_result(result)
         say(f"in {result['out']}: policy.png, learning.png, recording.rrd")
         say(f"look at the saccades: orient-eye view {result['out']}/recording.rrd")
         return result
+
+
+def say_result(result: dict[str, Any]) -> None:
+    """The table, the gaps and the failures of a training or an evaluation."""
+    from orient_eye.cli import say
+
+    say(learned_table(result))
+    say(
+        f"mean reward gap to the searched optimum over {result['pairs']} random saccades: "
+        f"{100 * result['gap_mean']:.2f} % (95th percentile {100 * result['gap_p95']:.2f} %)"
+    )
+    if result["failed_saccades"]:
+        say(f"[red]{result['failed_saccades']} simulated saccades failed and got the worst reward[/red]")
 
 
 def learned_table(result: dict[str, Any]) -> Any:

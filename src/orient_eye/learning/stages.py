@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from orient_eye.errors import InputError
-from orient_eye.eye import build_model
 from orient_eye.learning.evaluation import Yardstick
-from orient_eye.recording import record
+from orient_eye.recording import model_of, record
 from orient_eye.saccade import SaccadeTask
 from orient_eye.trajectory import Trajectory, concatenate
 
@@ -28,7 +27,7 @@ def record_stages(task: SaccadeTask, folder: Path, table: Yardstick) -> Path:
     return record(
         folder / "recording.rrd",
         concatenate(parts),
-        model=build_model(task.plant.identity().get("eye", "thesis")),
+        model=model_of(task.plant.identity()),
         target=np.concatenate([table.target] * len(parts)),
         titles=[f"{a:g} deg" for a in amplitude] * len(parts),
         groups=[name for name in names for _ in amplitude],

@@ -22,6 +22,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -38,6 +39,11 @@ from orient_eye.recording.scene import Scene, slug
 from orient_eye.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+
+
+def model_of(identity: dict[str, Any]) -> mujoco.MjModel:
+    """The eye to draw for a plant's identity: its own, or the thesis' where the plant has none."""
+    return build_model(identity.get("eye", "thesis"))
 
 
 def record(

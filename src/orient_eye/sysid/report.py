@@ -153,8 +153,7 @@ def _pictures(found: Identification, folder: Path) -> list[str]:
 
 
 def _recording(found: Identification, folder: Path) -> list[str]:
-    from orient_eye.eye import build_model
-    from orient_eye.recording import record
+    from orient_eye.recording import model_of, record
 
     reference = None
     if found.trajectory is not None:
@@ -170,7 +169,7 @@ def _recording(found: Identification, folder: Path) -> list[str]:
         trajectory = replay(steps)
         notes = "Recorded step responses, replayed on the model of the eye: its tendons and arms are the model's"
     titles = [s.name for s in steps]
-    eye = build_model(found.surrogate.details.get("plant", {}).get("eye", "thesis"))
+    eye = model_of(found.surrogate.details.get("plant", {}))
     record(folder / "recording.rrd", trajectory, model=eye, titles=titles, reference=reference, notes=notes)
     return ["recording.rrd"]
 
