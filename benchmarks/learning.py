@@ -17,7 +17,7 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 
-from orient_eye.environment import SaccadeVecEnv
+from orient_eye.environments.saccade_env import SaccadeVecEnv
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 

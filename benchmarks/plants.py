@@ -14,10 +14,10 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
+from orient_eye.commands.pulse_step import PulseStep
+from orient_eye.movement.trajectory import EyeState
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.pulse_step import PulseStep
 from orient_eye.rotations import FORWARD
-from orient_eye.trajectory import EyeState
 
 AUTHOR_STEPS_PER_S = 944
 

@@ -21,7 +21,7 @@ import trimesh
 import tyro
 from numpy.typing import NDArray
 
-from orient_eye.eye import EYES
+from orient_eye.eyes import EYES
 from orient_eye.files import write_atomically
 from orient_eye.resources import data_folder
 

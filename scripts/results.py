@@ -19,9 +19,9 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from orient_eye.cases import CASES
 from orient_eye.files import write_text
 from orient_eye.learning.policy import Policy
+from orient_eye.task.cases import CASES
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- scripts/results.py -->", "<!-- end -->"

@@ -16,14 +16,14 @@ from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 from stable_baselines3.common.vec_env import VecMonitor
 
 import orient_eye
-from orient_eye.cases import CASES
-from orient_eye.environment import SaccadeEnv, SaccadeVecEnv, log_reward, observe, to_action, to_scaled
+from orient_eye.environments.saccade_env import SaccadeEnv, SaccadeVecEnv, log_reward, observe, to_action, to_scaled
 from orient_eye.errors import InputError
 from orient_eye.plants import PLANTS, make_plant
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.rotations import from_yaw, to_euler
-from orient_eye.saccade import SaccadeTask, horizontal
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.cases import CASES
+from orient_eye.task.saccade import SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
 ID = "OrientEye/Saccade-v0"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from orient_eye.exponentials import ExponentialSum, Term, filter_energy
+from orient_eye.commands.exponentials import ExponentialSum, Term, filter_energy
 
 Array = NDArray[np.float64]
 POWERS = (0, 1, 2)

@@ -1,4 +1,4 @@
-"""Facts of the eye: the MJCF, its presets, and what `orient_eye.eye` reads from them."""
+"""Facts of the eye: the MJCF, its presets, and what `orient_eye.eyes` reads from them."""
 
 import importlib.util
 import re
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orient_eye.errors import InputError
-from orient_eye.eye import (
+from orient_eye.eyes import (
     EYES,
     STANDARD_GRAVITY,
     Elastics,

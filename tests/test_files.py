@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from orient_eye.commands.motor_file import read_command, rest_position
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically, write_text
-from orient_eye.motor_file import read_command, rest_position
+from orient_eye.movement.trajectory import Trajectory, concatenate, motor_column
 from orient_eye.plants import Plant, make_plant
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.rotations import from_yaw
 from orient_eye.surrogate import Surrogate
-from orient_eye.trajectory import Trajectory, concatenate, motor_column
 
 Array = NDArray[np.float64]
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from orient_eye.measures import BAND, Measures, measure, measure_response
+from orient_eye.commands.pulse_step import FIXED_C, PULSES, PulseStep, varying_C
+from orient_eye.movement.measures import BAND, Measures, measure, measure_response
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.pulse_step import FIXED_C, PULSES, PulseStep, varying_C
 from orient_eye.rotations import FORWARD, angle_between, from_yaw, rotation, to_euler
 from orient_eye.surrogate import Surrogate
-from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 K, W0 = 1.4758, 17.5  # thesis 3.3.1

@@ -13,18 +13,18 @@ import pytest
 import tyro
 from numpy.typing import NDArray
 
-from orient_eye import optimum_cache
-from orient_eye.cases import CASES
 from orient_eye.cli.optimum import OptimumCommand, read_pairs, second_search
 from orient_eye.errors import InputError
-from orient_eye.optimum import Optimum, find_optimum
-from orient_eye.optimum_cache import cache_folder, searched_optimum
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.reward import Weights
 from orient_eye.run_directory import plain
-from orient_eye.saccade import SaccadeTask
+from orient_eye.search import optimum_cache
+from orient_eye.search.optimum import Optimum, find_optimum
+from orient_eye.search.optimum_cache import cache_folder, searched_optimum
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.cases import CASES
+from orient_eye.task.reward import Weights
+from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
 START, TARGET = np.array([0.0, -5.0]), np.array([30.0, 5.0])

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.signal import lsim
 
+from orient_eye.commands.pulse_step import FIXED_C, PULSES, PulseStep
 from orient_eye.errors import InputError
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, PLANTS, Plant, make_plant
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import TavaresPlant
-from orient_eye.pulse_step import FIXED_C, PULSES, PulseStep
 from orient_eye.rotations import FORWARD, angle_between, from_euler, from_yaw, rotation, to_euler
 from orient_eye.surrogate import Surrogate
-from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 ELASTIC = [name for name in PLANTS if name != "lpf"]

@@ -18,7 +18,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from stable_baselines3 import SAC
 
-from orient_eye.environment import SaccadeEnv, SaccadeVecEnv, observe, to_action
+from orient_eye.environments.saccade_env import SaccadeEnv, SaccadeVecEnv, observe, to_action
 from orient_eye.errors import InputError
 from orient_eye.learning.policy import GAZE_INPUTS, QUATERNION_INPUTS, Policy, shipped_policies
 from orient_eye.learning.policy_export import export_onnx, export_sb3, import_sb3
@@ -27,9 +27,9 @@ from orient_eye.learning.sac import GazeFeatures, OneStepSAC
 from orient_eye.plants import make_plant
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.resources import data_folder
-from orient_eye.reward import Weights
-from orient_eye.saccade import SaccadeTask, horizontal
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.reward import Weights
+from orient_eye.task.saccade import SaccadeTask, horizontal
 
 
 def make_policy(task: SaccadeTask, seed: int = 0, sizes: tuple[int, ...] = (GAZE_INPUTS, 32, 16)) -> Policy:

@@ -15,19 +15,19 @@ from orient_eye.cli.evaluate import Evaluate
 from orient_eye.cli.export import Export
 from orient_eye.cli.models import Models
 from orient_eye.cli.predict import AnotherPlant, Predict
+from orient_eye.commands.motor_file import read_command, rest_position
 from orient_eye.errors import InputError
 from orient_eye.learning import figures
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.policy import Policy
-from orient_eye.measures import measure
-from orient_eye.motor_file import read_command, rest_position
-from orient_eye.optimum import Optimum
+from orient_eye.movement.measures import measure
+from orient_eye.movement.trajectory import EyeState
 from orient_eye.plants import make_plant
 from orient_eye.resources import data_folder
 from orient_eye.rotations import to_euler
-from orient_eye.saccade import SaccadeTask, horizontal
+from orient_eye.search.optimum import Optimum
 from orient_eye.surrogate import Surrogate
-from orient_eye.trajectory import EyeState
+from orient_eye.task.saccade import SaccadeTask, horizontal
 from test_policy import make_policy
 
 PNG = b"\x89PNG"

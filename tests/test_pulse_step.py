@@ -17,12 +17,12 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import gammainc
 
+from orient_eye.commands.pulse_step import FIXED_C, PULSES, SPEED_LIMIT, PulseStep, keeps_speed_limit, varying_C
 from orient_eye.errors import InputError
 from orient_eye.plants import make_plant
 from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.pulse_step import FIXED_C, PULSES, SPEED_LIMIT, PulseStep, keeps_speed_limit, varying_C
-from orient_eye.saccade import SaccadeTask, horizontal
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.saccade import SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
 K, W0 = 1.4758, 17.5  # thesis 3.3.1

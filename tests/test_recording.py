@@ -16,12 +16,12 @@ from rerun.chunk import RrdReader
 from orient_eye import rotations
 from orient_eye.cli.view import View
 from orient_eye.errors import InputError
-from orient_eye.eye import build_model, tendon_tension
+from orient_eye.eyes import build_model, tendon_tension
+from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.recording import curves, record, viewer
 from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.scene import SLACK_COLOUR, TENSION_COLOURS, tension_colours
-from orient_eye.trajectory import Trajectory
 
 TARGETS_DEG = np.array([10.0, -15.0, 20.0])
 

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
+from orient_eye.commands.pulse_step import FIXED_C, PulseStep, varying_C
 from orient_eye.errors import InputError
-from orient_eye.measures import Measures, measure
-from orient_eye.optimum import Optimum, _scan, find_optimum
+from orient_eye.movement.measures import Measures, measure
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.pulse_step import FIXED_C, PulseStep, varying_C
-from orient_eye.reward import Reward, Weights, reward
 from orient_eye.rotations import FORWARD, from_euler, from_yaw
-from orient_eye.saccade import B_RANGE, K0_RANGE, YAW_RANGE_DEG, Fixation, SaccadeTask, horizontal
+from orient_eye.search.optimum import Optimum, _scan, find_optimum
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.reward import Reward, Weights, reward
+from orient_eye.task.saccade import B_RANGE, K0_RANGE, YAW_RANGE_DEG, Fixation, SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
 K = 1.4758  # thesis 3.3.1

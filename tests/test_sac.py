@@ -9,7 +9,7 @@ import torch
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from orient_eye.environment import SaccadeVecEnv
+from orient_eye.environments.saccade_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer

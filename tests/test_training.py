@@ -15,15 +15,15 @@ import pytest
 import torch
 
 from orient_eye.cli.train import Train
-from orient_eye.environment import SaccadeVecEnv
+from orient_eye.environments.saccade_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.config import TrainConfig
 from orient_eye.learning.loop import TrainingLoop
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.training import resume, train
 from orient_eye.plants import make_plant
-from orient_eye.reward import reward
-from orient_eye.saccade import Fixation, Outcome, SaccadeTask, horizontal
+from orient_eye.task.reward import reward
+from orient_eye.task.saccade import Fixation, Outcome, SaccadeTask, horizontal
 
 TINY = TrainConfig(updates=60, saccades_per_update=16, warmup=64, batch_size=64, evaluation_pairs=4)
 
@@ -235,7 +235,7 @@ def test_trains_on_the_whole_eye(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     config = TrainConfig(plant="mujoco", updates=3, saccades_per_update=4, warmup=8, batch_size=16, evaluation_pairs=1)
     # The search on this plant takes minutes: a short one stands in for it here.
     from orient_eye.learning import evaluation
-    from orient_eye.optimum import find_optimum
+    from orient_eye.search.optimum import find_optimum
 
     def short(task: SaccadeTask, start: np.ndarray, target: np.ndarray, **_: object) -> object:
         random = np.random.default_rng(0)

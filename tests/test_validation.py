@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from orient_eye import validation
+from orient_eye.commands.pulse_step import PulseStep
+from orient_eye.movement.trajectory import EyeState
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import STATIC_FRICTION, TavaresPlant
-from orient_eye.pulse_step import PulseStep
 from orient_eye.rotations import FORWARD, rotation, to_euler
-from orient_eye.trajectory import EyeState
 from orient_eye.validation import Check, against_author, against_reference, against_truth, author_runs
 
 Array = NDArray[np.float64]

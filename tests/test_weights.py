@@ -10,20 +10,20 @@ import tyro
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from orient_eye import measures
-from orient_eye.cases import CASES
 from orient_eye.cli.weights import WeightsCommand
 from orient_eye.errors import InputError
-from orient_eye.optimum import find_optimum
+from orient_eye.movement import measures
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import TavaresPlant
-from orient_eye.reward import Weights, reward
 from orient_eye.rotations import from_yaw
 from orient_eye.run_directory import plain
-from orient_eye.saccade import SaccadeTask, horizontal
+from orient_eye.search.optimum import find_optimum
 from orient_eye.surrogate import Surrogate
-from orient_eye.weights import ChosenSaccade, Steps, resolve, solve_weights
+from orient_eye.task.cases import CASES
+from orient_eye.task.reward import Weights, reward
+from orient_eye.task.saccade import SaccadeTask, horizontal
+from orient_eye.task.weights import ChosenSaccade, Steps, resolve, solve_weights
 
 Array = NDArray[np.float64]
 THESIS_BAND = 0.01 / np.sqrt(2)

@@ -13,4 +13,4 @@ import gymnasium
 
 __version__ = metadata.version("orient-eye")
 
-gymnasium.register(id="OrientEye/Saccade-v0", entry_point="orient_eye.environment:SaccadeEnv")
+gymnasium.register(id="OrientEye/Saccade-v0", entry_point="orient_eye.environments.saccade_env:SaccadeEnv")

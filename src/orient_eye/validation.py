@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from orient_eye.commands.pulse_step import PulseStep
+from orient_eye.movement.trajectory import EyeState
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import TavaresPlant
-from orient_eye.pulse_step import PulseStep
 from orient_eye.resources import data_folder
 from orient_eye.rotations import FORWARD, angle_between, rotation
-from orient_eye.trajectory import EyeState
 
 Array = NDArray[np.float64]
 AUTHOR_LIMIT_DEG = 0.02

@@ -11,7 +11,7 @@ from orient_eye.cli.predict import AnotherPlant
 if TYPE_CHECKING:
     from orient_eye.learning.evaluation import Yardstick
     from orient_eye.learning.policy import Policy
-    from orient_eye.saccade import SaccadeTask
+    from orient_eye.task.saccade import SaccadeTask
 
 
 @dataclass(frozen=True)

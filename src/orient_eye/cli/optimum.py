@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.table import Table
 
-    from orient_eye.optimum import Optimum
-    from orient_eye.saccade import SaccadeTask
+    from orient_eye.search.optimum import Optimum
+    from orient_eye.task.saccade import SaccadeTask
 
     Array = NDArray[np.float64]
 
@@ -71,8 +71,8 @@ class OptimumCommand:
         from orient_eye.cli import say
         from orient_eye.errors import InputError
         from orient_eye.plants import chosen_plant
-        from orient_eye.reward import Weights
-        from orient_eye.saccade import SaccadeTask
+        from orient_eye.task.reward import Weights
+        from orient_eye.task.saccade import SaccadeTask
 
         start, target = self._saccades()
         if self.out and self.out.is_dir():
@@ -120,7 +120,7 @@ class OptimumCommand:
 
     def _search(self, task: "SaccadeTask", start: "Array", target: "Array") -> "tuple[Optimum, bool]":
         """The optimum, and whether it was remembered."""
-        from orient_eye.optimum_cache import searched_optimum
+        from orient_eye.search.optimum_cache import searched_optimum
 
         remembered = True
         with _progress_bar(self.quiet) as bar:
@@ -156,13 +156,13 @@ def second_search(task: "SaccadeTask", start_yaw_deg: float, target_yaw_deg: flo
     """The best action of one saccade [B, D, k0] and its reward, by scipy's optimisers.
 
     Differential evolution, then Nelder and Mead's simplex around the best; once for either half of the range of
-    k0, since one alone may end on the wrong side of the overshoot. It shares with `orient_eye.optimum` only
+    k0, since one alone may end on the wrong side of the overshoot. It shares with `orient_eye.search.optimum` only
     the task, and knows nothing of where the optimum should be.
     """
     import numpy as np
     from scipy.optimize import differential_evolution, minimize
 
-    from orient_eye.saccade import horizontal
+    from orient_eye.task.saccade import horizontal
 
     start, goal = task.fixate(horizontal(start_yaw_deg)), horizontal(target_yaw_deg)
     low, high = task.action_low[0], task.action_high[0]
@@ -260,7 +260,7 @@ def _rows(task: "SaccadeTask", start_yaw: "Array", target_yaw: "Array", best: "O
     import numpy as np
 
     from orient_eye.rotations import to_euler
-    from orient_eye.saccade import horizontal
+    from orient_eye.task.saccade import horizontal
 
     start = task.fixate(horizontal(start_yaw))
     outcome = task.perform(start, best.action, horizontal(target_yaw))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from orient_eye.learning.policy import Policy
-    from orient_eye.saccade import Outcome, SaccadeTask
+    from orient_eye.task.saccade import Outcome, SaccadeTask
 
     Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ class Predict:
         from orient_eye.cli import say
         from orient_eye.errors import InputError
         from orient_eye.learning.policy import Policy
-        from orient_eye.saccade import horizontal
+        from orient_eye.task.saccade import horizontal
 
         start_yaw, target_yaw = self._saccades()
         if self.command and len(start_yaw) != 1:
@@ -128,7 +128,7 @@ class Predict:
 
         from orient_eye.cli.optimum import read_pairs
         from orient_eye.errors import InputError
-        from orient_eye.saccade import YAW_RANGE_DEG
+        from orient_eye.task.saccade import YAW_RANGE_DEG
 
         if self.pairs and (self.start is not None or self.target is not None):
             raise InputError("give --pairs, or --start and --target, not both")
@@ -185,7 +185,7 @@ def saccade_rows(
 def _write_command(path: Path, trajectory: Any) -> None:
     """The motor command of one saccade at the plant's step; its first row is the rest position."""
     from orient_eye.files import write_table
-    from orient_eye.trajectory import motor_column
+    from orient_eye.movement.trajectory import motor_column
 
     columns = {motor_column(name): trajectory.motor[0, :, i] for i, name in enumerate(trajectory.motor_names)}
     names = [*_MOTOR_COLUMNS, *(name for name in columns if name not in _MOTOR_COLUMNS)]

@@ -37,13 +37,13 @@ class Simulate:
         import numpy as np
 
         from orient_eye.cli import say
+        from orient_eye.commands.motor_file import read_command, rest_position
         from orient_eye.figures import draw_trajectory
-        from orient_eye.motor_file import read_command, rest_position
+        from orient_eye.movement.trajectory import EyeState
         from orient_eye.plants import make_plant
         from orient_eye.recording import model_of, record
         from orient_eye.rotations import to_euler
         from orient_eye.run_directory import RunDirectory
-        from orient_eye.trajectory import EyeState
 
         options: dict[str, Any] = {"surrogate": self.surrogate} if self.plant == "lpf" else {"eye": self.eye}
         if self.plant != "lpf":

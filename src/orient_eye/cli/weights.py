@@ -7,7 +7,7 @@ import tyro
 
 if TYPE_CHECKING:
     from orient_eye.plants import Plant
-    from orient_eye.weights import ChosenSaccade, Steps
+    from orient_eye.task.weights import ChosenSaccade, Steps
 
 _ON_THE_PLANT = tyro.conf.arg(help_behavior_hint="(default: found on the plant)")
 
@@ -57,10 +57,10 @@ class WeightsCommand:
         """Solve and print the table."""
         from rich.table import Table
 
-        from orient_eye.cases import CASES
         from orient_eye.cli import say
         from orient_eye.plants import chosen_plant
-        from orient_eye.weights import ChosenSaccade, Steps
+        from orient_eye.task.cases import CASES
+        from orient_eye.task.weights import ChosenSaccade, Steps
 
         chosen = ChosenSaccade(self.start, self.target, self.B, self.D, self.k0)
         steps = Steps(self.step_B, self.step_D, self.step_k0)
@@ -89,8 +89,8 @@ class WeightsCommand:
         from dataclasses import asdict
 
         from orient_eye.errors import InputError
-        from orient_eye.saccade import SaccadeTask
-        from orient_eye.weights import resolve, solve_weights
+        from orient_eye.task.saccade import SaccadeTask
+        from orient_eye.task.weights import resolve, solve_weights
 
         task = SaccadeTask.of_case(plant, case, band=self.band, speed_limit=self.speed_limit)
         try:

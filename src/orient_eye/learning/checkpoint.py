@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from orient_eye.environment import SaccadeVecEnv
+from orient_eye.environments.saccade_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer

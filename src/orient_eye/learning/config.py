@@ -91,7 +91,7 @@ class TrainConfig:
         Raises:
             InputError: a number out of its range.
         """
-        from orient_eye.cases import get_case  # the physics, which --help does not wait for
+        from orient_eye.task.cases import get_case  # the physics, which --help does not wait for
 
         closed_form = self.plant == "lpf"
         weights = get_case(self.case).weights(self.plant)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orient_eye.optimum import Optimum
-from orient_eye.optimum_cache import searched_optimum
-from orient_eye.saccade import Fixation, Outcome, SaccadeTask, horizontal
+from orient_eye.search.optimum import Optimum
+from orient_eye.search.optimum_cache import searched_optimum
+from orient_eye.task.saccade import Fixation, Outcome, SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
 Act = Callable[[Array, Array], Array]

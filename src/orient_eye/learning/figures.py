@@ -18,15 +18,15 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.figures import save
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.policy import Policy
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants import plant_in_words
 from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.pulse_step import PulseStep
 from orient_eye.resources import data_folder
-from orient_eye.saccade import K0_RANGE, YAW_RANGE_DEG, Fixation, SaccadeTask, horizontal
-from orient_eye.trajectory import EyeState, Trajectory
+from orient_eye.task.saccade import K0_RANGE, YAW_RANGE_DEG, Fixation, SaccadeTask, horizontal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
-from orient_eye.environment import SaccadeVecEnv, observe, to_action
+from orient_eye.environments.saccade_env import SaccadeVecEnv, observe, to_action
 from orient_eye.errors import InputError
 from orient_eye.files import write_table
 from orient_eye.learning.checkpoint import save_checkpoint

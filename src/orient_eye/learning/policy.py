@@ -20,16 +20,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.commands.pulse_step import SPEED_LIMIT
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically, write_text
 from orient_eye.plants import Plant, make_plant, plant_in_words, value_in_words
 from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.pulse_step import SPEED_LIMIT
 from orient_eye.resources import data_folder
-from orient_eye.reward import Weights
 from orient_eye.rotations import rotation
-from orient_eye.saccade import YAW_RANGE_DEG, SaccadeTask
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.reward import Weights
+from orient_eye.task.saccade import YAW_RANGE_DEG, SaccadeTask
 
 Array = NDArray[np.float64]
 GAZE_INPUTS, QUATERNION_INPUTS = 6, 8

@@ -20,7 +20,7 @@ from orient_eye.errors import InputError
 from orient_eye.files import write_atomically
 from orient_eye.learning.policy import GAZE_INPUTS, Policy
 from orient_eye.run_directory import versions
-from orient_eye.saccade import YAW_RANGE_DEG, SaccadeTask
+from orient_eye.task.saccade import YAW_RANGE_DEG, SaccadeTask
 
 if TYPE_CHECKING:
     import onnx

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from orient_eye.errors import InputError
 from orient_eye.learning.network import Network, flatten, take_step
-from orient_eye.saccade import YAW_RANGE_DEG
+from orient_eye.task.saccade import YAW_RANGE_DEG
 
 Schedule = Callable[[float], float]
 _HALF_LOG_2_PI = 0.5 * math.log(2 * math.pi)

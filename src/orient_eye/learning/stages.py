@@ -6,9 +6,9 @@ import numpy as np
 
 from orient_eye.errors import InputError
 from orient_eye.learning.evaluation import Yardstick
+from orient_eye.movement.trajectory import Trajectory, concatenate
 from orient_eye.recording import model_of, record
-from orient_eye.saccade import SaccadeTask
-from orient_eye.trajectory import Trajectory, concatenate
+from orient_eye.task.saccade import SaccadeTask
 
 
 def record_stages(task: SaccadeTask, folder: Path, table: Yardstick) -> Path:

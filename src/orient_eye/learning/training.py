@@ -17,7 +17,7 @@ import torch
 from rich.progress import Progress
 from stable_baselines3.common.logger import Logger
 
-from orient_eye.environment import SaccadeVecEnv
+from orient_eye.environments.saccade_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.checkpoint import NAME as CHECKPOINT
 from orient_eye.learning.checkpoint import load_checkpoint
@@ -28,10 +28,10 @@ from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 from orient_eye.plants import Plant, chosen_plant
-from orient_eye.reward import Weights
 from orient_eye.run_directory import RunDirectory, versions
-from orient_eye.saccade import SaccadeTask
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.reward import Weights
+from orient_eye.task.saccade import SaccadeTask
 
 _NETS = [128, 128, 32]  # thesis 4.6
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.trajectory import EyeState, Trajectory
+from orient_eye.movement.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 ELASTIC_ACTION_RANGE_DEG = 40.0

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from orient_eye import rotations
+from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants import check_command, check_start
-from orient_eye.pulse_step import PulseStep
 from orient_eye.surrogate import Surrogate
-from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from orient_eye import eye as eyes
+from orient_eye import eyes
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, check_command, check_start, equilibrium
 from orient_eye.rotations import rotation
-from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 _ACCURATE_SUBSTEPS = 5
@@ -31,7 +31,7 @@ class MujocoPlant:
     """The elastic eye of `eye_mjcf/eye3.xml` as a plant; see `orient_eye.plants.Plant`.
 
     Args:
-        eye: preset, one of `orient_eye.eye.EYES`.
+        eye: preset, one of `orient_eye.eyes.EYES`.
         accurate: integrate at 0.2 ms, friction implicit, instead of the thesis' explicit 1 ms.
         gravity: add the gravity torque (thesis 3.8), off in the thesis' runs.
         threads: of the batch; 0 for one a core.

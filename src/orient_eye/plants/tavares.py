@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from orient_eye import eye as eyes
-from orient_eye.eye import STANDARD_GRAVITY, Elastics
+from orient_eye import eyes
+from orient_eye.eyes import STANDARD_GRAVITY, Elastics
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, check_command, check_start, equilibrium
 from orient_eye.rotations import FORWARD, rotation
-from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 STATIC_FRICTION = 0.006
@@ -30,7 +30,7 @@ class TavaresPlant:
     """The reference simulator as a plant; see `orient_eye.plants.Plant`.
 
     Args:
-        eye: preset, one of `orient_eye.eye.EYES`.
+        eye: preset, one of `orient_eye.eyes.EYES`.
         gravity: add the gravity torque (thesis 3.8).
         as_published: the author's program to the letter. The inertia is turned as printed, R^T I R (3.10,
             it should be R I R^T), there is no gyroscopic torque, a step adds a straight piece to the

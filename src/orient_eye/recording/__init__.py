@@ -30,13 +30,13 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.errors import InputError
-from orient_eye.eye import build_model
+from orient_eye.eyes import build_model
 from orient_eye.files import write_atomically
+from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording.curves import STILL_DEG, Curves
 from orient_eye.recording.layout import SaccadeTab, blueprint, saccade_colours
 from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.scene import Scene, slug
-from orient_eye.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording.scene import REFERENCE_COLOUR, TIMELINE, Colour, slug
-from orient_eye.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -11,9 +11,9 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from orient_eye import eye as eyes
+from orient_eye import eyes
 from orient_eye.errors import InputError
-from orient_eye.trajectory import Trajectory
+from orient_eye.movement.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

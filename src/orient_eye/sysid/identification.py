@@ -14,6 +14,7 @@ import numpy as np
 from scipy import stats
 
 from orient_eye.errors import InputError
+from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import Plant, plant_in_words
 from orient_eye.surrogate import Surrogate
 from orient_eye.sysid.comparison import Compared, HeldOut, compare, predict, preferred
@@ -22,7 +23,6 @@ from orient_eye.sysid.models import MODELS
 from orient_eye.sysid.plant_steps import plant_steps
 from orient_eye.sysid.recording_checks import warnings_of
 from orient_eye.sysid.step_response import StepResponse
-from orient_eye.trajectory import Trajectory
 
 REFERENCE_DEG = 10.0
 """The thesis takes w0 from the step of this amplitude (section 3.3.1)."""

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants import Plant
 from orient_eye.sysid.step_response import StepResponse, axis_angle
-from orient_eye.trajectory import EyeState, Trajectory
 
 Array = NDArray[np.float64]
 DURATION_S = 0.8

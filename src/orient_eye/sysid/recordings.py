@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.errors import InputError
+from orient_eye.movement.trajectory import motor_column
 from orient_eye.sysid import prototype_log
 from orient_eye.sysid.step_response import AXES, StepResponse, axis_angle
-from orient_eye.trajectory import motor_column
 
 Array = NDArray[np.float64]
 MIN_ROWS = 8

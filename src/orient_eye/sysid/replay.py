@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Slerp
 
+from orient_eye.movement.trajectory import Trajectory
 from orient_eye.rotations import rotation
 from orient_eye.sysid.step_response import StepResponse
-from orient_eye.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 _STEP_S = 0.005

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from orient_eye.files import write_text
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants.lpf import LowPassPlant
 from orient_eye.sysid.comparison import Compared, HeldOut
 from orient_eye.sysid.fit import Fit
 from orient_eye.sysid.identification import Identification
 from orient_eye.sysid.models import MODELS
 from orient_eye.sysid.replay import replay
-from orient_eye.trajectory import EyeState, Trajectory
 
 _SHOWN_STEPS = 9  # of a plant, in the recording and in Figure 3.6
 

@@ -20,8 +20,8 @@ from orient_eye.sysid.models import MODELS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from orient_eye.movement.trajectory import Trajectory
     from orient_eye.sysid.identification import Identification
-    from orient_eye.trajectory import Trajectory
 
 _DATA, _MODEL, _OTHER = "#1f4e9c", "#d1495b", "#2a9d6f"
 _DPI = 130

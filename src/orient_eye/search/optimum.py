@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.saccade import Fixation, SaccadeTask
+from orient_eye.task.saccade import Fixation, SaccadeTask
 
 Array = NDArray[np.float64]
 _ISLANDS = 3

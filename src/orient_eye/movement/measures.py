@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orient_eye import rotations
+from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants.lpf import LowPassResponse
 from orient_eye.rotations import rotation
-from orient_eye.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 BAND = 0.01

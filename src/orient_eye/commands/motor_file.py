@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
+from orient_eye.movement.trajectory import motor_column
 from orient_eye.plants import Plant
-from orient_eye.trajectory import motor_column
 
 Array = NDArray[np.float64]
 

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orient_eye.commands.pulse_step import FIXED_C, SPEED_LIMIT, PulseStep, keeps_speed_limit, varying_C
 from orient_eye.errors import InputError
-from orient_eye.measures import BAND, Measures, measure, measure_response
+from orient_eye.movement.measures import BAND, Measures, measure, measure_response
+from orient_eye.movement.trajectory import EyeState, Trajectory
 from orient_eye.plants import Plant
 from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.pulse_step import FIXED_C, SPEED_LIMIT, PulseStep, keeps_speed_limit, varying_C
-from orient_eye.reward import Reward, Weights, reward
 from orient_eye.rotations import from_yaw
-from orient_eye.trajectory import EyeState, Trajectory
+from orient_eye.task.reward import Reward, Weights, reward
 
 Array = NDArray[np.float64]
 B_RANGE = (18.0, 80.0)
@@ -107,7 +107,7 @@ class SaccadeTask:
 
     @classmethod
     def of_case(cls, plant: Plant, case: str, **options: Any) -> "SaccadeTask":
-        """One of the thesis' five cases (`orient_eye.cases.CASES`) on a plant.
+        """One of the thesis' five cases (`orient_eye.task.cases.CASES`) on a plant.
 
         Args:
             plant: any plant.
@@ -117,7 +117,7 @@ class SaccadeTask:
         Raises:
             InputError: unknown case.
         """
-        from orient_eye.cases import get_case
+        from orient_eye.task.cases import get_case
 
         chosen = get_case(case)
         of_case = {"variant": chosen.variant, "C": chosen.C, "weights": chosen.weights(plant.name)}

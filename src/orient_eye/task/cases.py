@@ -8,9 +8,9 @@ weights --plant mujoco`). A plant with other constants keeps those of its kind.
 
 from dataclasses import dataclass
 
+from orient_eye.commands.pulse_step import FIXED_C
 from orient_eye.errors import InputError
-from orient_eye.pulse_step import FIXED_C
-from orient_eye.reward import Weights
+from orient_eye.task.reward import Weights
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from platformdirs import user_cache_path
 
 from orient_eye import __version__
 from orient_eye.files import write_atomically
-from orient_eye.optimum import Optimum, find_optimum
-from orient_eye.saccade import SaccadeTask, horizontal
+from orient_eye.search.optimum import Optimum, find_optimum
+from orient_eye.task.saccade import SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
 _SEARCH = "differential evolution 2"  # changes when the search does

@@ -20,7 +20,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from orient_eye.errors import InputError
 from orient_eye.plants import Plant, make_plant
 from orient_eye.rotations import to_euler
-from orient_eye.saccade import Fixation, Outcome, SaccadeTask, horizontal
+from orient_eye.task.saccade import Fixation, Outcome, SaccadeTask, horizontal
 
 Array = NDArray[np.float64]
 _REFERENCE_REWARD = 1e5  # where the log reward is 0: the cost of a large saccade done well
@@ -85,7 +85,7 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     | 2 | k0, gain of the integrator | 5 1/s | 40 1/s |
 
     ## Reward
-    lambda_a R_a + lambda_e R_e + lambda_d R_d + lambda_o R_o (thesis 4.32; `orient_eye.reward`), between
+    lambda_a R_a + lambda_e R_e + lambda_d R_d + lambda_o R_o (thesis 4.32; `orient_eye.task.reward`), between
     -1e10 and 0: about -7e4 for a good saccade of 30 deg. With `log_reward=True`, -log10 of its size in
     units of 1e5, which has the same optimal policy and is easier to learn.
 
@@ -101,7 +101,7 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         plant: a name of `orient_eye.plants.PLANTS`, a plant, or a whole task.
         plant_options: keywords of that plant.
         log_reward: give the log reward.
-        task_options: the case, a name of `orient_eye.cases.CASES` ("1" unless given), and keywords of
+        task_options: the case, a name of `orient_eye.task.cases.CASES` ("1" unless given), and keywords of
             `SaccadeTask` that differ from it: driven, variant, C, weights, speed_limit, band, horizon_s.
     """
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.measures import Measures
+from orient_eye.movement.measures import Measures
 
 Array = NDArray[np.float64]
 DISCOUNT = 0.6
@@ -22,7 +22,7 @@ DISCOUNT = 0.6
 class Weights:
     """Weights of the reward's terms (4.32).
 
-    The defaults are those of case 1 on the low-pass plant; `orient_eye.cases` has every case's.
+    The defaults are those of case 1 on the low-pass plant; `orient_eye.task.cases` has every case's.
     """
 
     accuracy: float = 2.66e7

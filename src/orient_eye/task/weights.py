@@ -14,9 +14,9 @@ import numpy as np
 from orient_eye.errors import InputError
 from orient_eye.plants import Plant
 from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.reward import Weights
-from orient_eye.saccade import K0_RANGE, SaccadeTask, horizontal
 from orient_eye.surrogate import Surrogate
+from orient_eye.task.reward import Weights
+from orient_eye.task.saccade import K0_RANGE, SaccadeTask, horizontal
 
 _THESIS_D = 20.33  # deg; 30 deg / K = 20.328 on the thesis' surrogate, which the thesis takes as 20.33
 

@@ -19,8 +19,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orient_eye.commands.exponentials import ExponentialSum, Term, filter_energy
 from orient_eye.errors import InputError
-from orient_eye.exponentials import ExponentialSum, Term, filter_energy
 
 Array = NDArray[np.float64]
 SPEED_LIMIT = 7200.0
