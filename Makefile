@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DEMO ?= demo
+COVERAGE ?= --cov --cov-report=term:skip-covered
 
 .PHONY: help demo test check bench clean
 
 help:
 	@echo "make demo   install, identify the eye, train a saccade policy (minutes), picture and recording in $(DEMO)/"
-	@echo "make test   install and run all tests"
+	@echo "make test   install and run all tests, with coverage of lines and branches; make test COVERAGE= is faster"
 	@echo "make check  ruff and the type checker"
 	@echo "make bench  speed of the plants and of the learning, as ratios"
 
@@ -30,7 +31,7 @@ demo: $(INSTALLED)
 	@echo "  $(BIN)/orient-eye view $(DEMO)/train/recording.rrd    the saccades in 3-D, at several stages of training"
 
 test: $(INSTALLED)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(COVERAGE)
 
 check: $(INSTALLED)
 	$(BIN)/ruff check src tests scripts benchmarks
@@ -42,4 +43,4 @@ bench: $(INSTALLED)
 	$(BIN)/python benchmarks/learning.py
 
 clean:
-	rm -rf $(VENV) $(DEMO) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEMO) .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,10 +1,11 @@
 """Updates a second of OneStepSAC against stock Stable-Baselines3 SAC: ratios within one run.
 
-    python benchmarks/learning.py [--device cuda]
+    python benchmarks/learning.py [--batch 1024] [--device cuda]
 
 Same environment, networks 128-128-32, batch 512, a replay buffer of 8192 saccades; blocks of updates in
-turn. The last line is the time of the matrix products alone that one update of ours needs. On another device
-than the CPU, the CPU competes too. Threads of torch wait badly: measure on a machine with nothing else to do.
+turn. The autograd twin makes the same updates as ours, by torch's autograd (docs/decisions/0003-networks-by-hand.md).
+The last line is the time of the matrix products alone that one update of ours needs. On another device than the CPU,
+the CPU competes too. Threads of torch wait badly: measure on a machine with nothing else to do.
 """
 
 import argparse
@@ -16,13 +17,44 @@ import numpy as np
 import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
+from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
+from torch import nn
 
-from orient_eye.environments.saccade_env import SaccadeVecEnv
+from orient_eye.environments.sb3_env import SaccadeVecEnv
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 
 NETS = [128, 128, 32]
 DEFAULT = "OneStepSAC, 1 critic, 1 torch thread (default)"
+
+
+class AutogradTwin(SAC):
+    """The updates of `OneStepSAC` with one critic, by autograd: no target network, features once a batch."""
+
+    def train(self, gradient_steps: int, batch_size: int = 64) -> None:
+        """Updates of Q and policy from the replay buffer."""
+        actor, q = self.actor, self.critic.q_networks[0]
+        self._update_learning_rate([actor.optimizer, self.critic.optimizer])
+        assert self.replay_buffer is not None
+        weights = list(actor.parameters())
+        torch.set_flush_denormal(True)
+        for _ in range(gradient_steps):
+            data = self.replay_buffer.sample(batch_size)
+            with torch.no_grad():
+                features = actor.extract_features(data.observations, actor.features_extractor)
+            self.critic.optimizer.zero_grad()
+            nn.functional.mse_loss(q(torch.cat([features, data.actions], dim=1)), data.rewards).backward()
+            self.critic.optimizer.step()
+            latent = actor.latent_pi(features)
+            log_std = actor.log_std(latent).clamp(LOG_STD_MIN, LOG_STD_MAX)
+            noise = torch.randn_like(log_std)
+            actions = torch.tanh(actor.mu(latent) + log_std.exp() * noise)
+            entropy = (log_std + 0.5 * noise**2 + torch.log(1 - actions**2 + 1e-6)).sum(dim=1).mean()
+            value = q(torch.cat([features, actions], dim=1)).mean()
+            actor.optimizer.zero_grad()
+            (-self.ent_coef_tensor * entropy - value).backward(inputs=weights)
+            actor.optimizer.step()
+        torch.set_flush_denormal(False)
 
 
 def main() -> None:
@@ -32,20 +64,25 @@ def main() -> None:
     parser.add_argument("--updates", type=int, default=200, help="a block")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--threads", type=int, help="of torch, beside one; 1 leaves these rows out; default: all cores")
     options = parser.parse_args()
-    env = SaccadeVecEnv(128, "lpf", log_reward=True, seed=0)
+    env = SaccadeVecEnv(128, "lpf", log_reward=True, seed=0, infos=False)
     stock = SAC("MlpPolicy", env, policy_kwargs={"net_arch": NETS}, **common(options.batch, options.device))
     one, two = (ours(env, critics, options.batch, options.device) for critics in (1, 2))
-    threads = torch.get_num_threads()
-    contestants = {
+    twin = AutogradTwin("MlpPolicy", env, ent_coef=1.0, **alike(1), **common(options.batch, options.device))
+    threads = options.threads or torch.get_num_threads()
+    contestants: dict[str, tuple[SAC, int]] = {
         f"stock SB3 SAC, 2 critics, {threads} torch threads": (stock, threads),
         "stock SB3 SAC, 2 critics, 1 torch thread": (stock, 1),
         f"OneStepSAC, 1 critic, {threads} torch threads": (one, threads),
         DEFAULT: (one, 1),
+        "autograd twin, 1 critic, 1 torch thread": (twin, 1),
         "OneStepSAC, 2 critics, 1 torch thread": (two, 1),
     }
     if options.device != "cpu":
         contestants["the default, but on the CPU"] = (ours(env, 1, options.batch, "cpu"), 1)
+    if threads == 1:
+        contestants = {name: entry for name, entry in contestants.items() if "torch threads" not in name}
     for model in {id(model): model for model, _ in contestants.values()}.values():
         model.set_logger(Logger(folder=None, output_formats=[]))
         fill(model, env)
@@ -83,15 +120,16 @@ def common(batch: int, device: str) -> dict[str, Any]:
 
 def ours(env: SaccadeVecEnv, critics: int, batch: int, device: str) -> OneStepSAC:
     """Ours, as `orient-eye train` makes it."""
+    return OneStepSAC("MlpPolicy", env, temperature=falling_temperature(), **alike(critics), **common(batch, device))
+
+
+def alike(critics: int) -> dict[str, Any]:
+    """What ours and its autograd twin have alike."""
     policy = {"net_arch": NETS, "features_extractor_class": GazeFeatures, "n_critics": critics}
-    return OneStepSAC(
-        "MlpPolicy",
-        env,
-        temperature=falling_temperature(),
-        replay_buffer_class=OneStepReplayBuffer,
-        policy_kwargs={**policy, "optimizer_kwargs": {"fused": True}},
-        **common(batch, device),
-    )
+    return {
+        "replay_buffer_class": OneStepReplayBuffer,
+        "policy_kwargs": {**policy, "optimizer_kwargs": {"fused": True}},
+    }
 
 
 def fill(model: SAC, env: SaccadeVecEnv) -> None:

@@ -15,9 +15,9 @@ import mujoco.rollout
 import numpy as np
 
 from orient_eye.commands.pulse_step import PulseStep
-from orient_eye.movement.trajectory import EyeState
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.rotations import FORWARD
+from orient_eye.state import State
 
 AUTHOR_STEPS_PER_S = 944
 
@@ -37,7 +37,7 @@ def main() -> None:
     )
     command = np.clip(pulse.sample(0.001, steps + 1), -80, 80)
     plant = MujocoPlant(threads=threads)
-    start = EyeState(np.tile(FORWARD, (n, 1)))
+    start = State(np.tile(FORWARD, (n, 1)), command[:, 0])
 
     model = plant.model
     datas = [mujoco.MjData(model) for _ in range(threads)]
@@ -50,7 +50,7 @@ def main() -> None:
     ours_s, bare_s = [], []
     for _ in range(options.rounds):
         began = time.perf_counter()
-        trajectory = plant.simulate(command, start)
+        trajectory = plant.move(command, start).trajectory()
         between = time.perf_counter()
         states, _ = bare.rollout(model, datas, state, control)
         bare_s.append(time.perf_counter() - between)

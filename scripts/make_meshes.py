@@ -22,6 +22,7 @@ import tyro
 from numpy.typing import NDArray
 
 from orient_eye.eyes import EYES
+from orient_eye.eyes.model import load_spec
 from orient_eye.files import write_atomically
 from orient_eye.resources import data_folder
 
@@ -266,13 +267,6 @@ def report(printed: Weighing, presets: dict[str, Weighing], wall: float, density
         f"least {least:.2e} kg m^2 about y and z, however they are spread.)"
     )
     return "\n".join(lines)
-
-
-def load_spec(preset: str) -> mujoco.MjSpec:
-    """A preset, not compiled: the meshes need not exist yet."""
-    spec = mujoco.MjSpec.from_file(str(data_folder("eye_mjcf") / "eye3.xml"))
-    EYES[preset](spec)
-    return spec
 
 
 def main(options: Options) -> None:

@@ -36,9 +36,9 @@ class Results:
     plants: tuple[str, ...] = ("lpf", "mujoco")
     """Plants: lpf learns all five cases, mujoco variant 1."""
     cases: tuple[str, ...] = tuple(CASES)
-    """Cases on lpf."""
+    """Cases that are learned on lpf."""
     seeds: tuple[int, ...] = (0, 1, 2)
-    """Of the runs."""
+    """Seeds of the runs."""
     parallel: int = 2
     """Runs on lpf at a time, one core each."""
     write: bool = False

@@ -2,6 +2,8 @@
 the same by every way in.
 """
 
+import subprocess
+import sys
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -11,19 +13,26 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
+from PIL import Image
 from stable_baselines3 import SAC
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 from stable_baselines3.common.vec_env import VecMonitor
 
 import orient_eye
-from orient_eye.environments.saccade_env import SaccadeEnv, SaccadeVecEnv, log_reward, observe, to_action, to_scaled
+from orient_eye.environments.batch import log_reward, observe
+from orient_eye.environments.saccade_env import SaccadeEnv
+from orient_eye.environments.sb3_env import SaccadeVecEnv
+from orient_eye.environments.vector_env import SaccadeVectorEnv
 from orient_eye.errors import InputError
+from orient_eye.eyes.model import ball
 from orient_eye.plants import PLANTS, make_plant
-from orient_eye.plants.lpf import LowPassPlant
+from orient_eye.plants.linear import LinearPlant
+from orient_eye.recording.frames import still, write_film
 from orient_eye.rotations import from_yaw, to_euler
 from orient_eye.surrogate import Surrogate
-from orient_eye.task.cases import CASES
-from orient_eye.task.saccade import SaccadeTask, horizontal
+from orient_eye.task.cases import Case
+from orient_eye.task.saccade import SaccadeTask
+from orient_eye.task.targets import saccades
 
 Array = NDArray[np.float64]
 ID = "OrientEye/Saccade-v0"
@@ -92,7 +101,7 @@ def test_chosen_start_and_target(plant: str) -> None:
     observation, info = env.reset(seed=1, options=chosen)
     np.testing.assert_allclose(observation, [*from_yaw(-12.5), *from_yaw(20.0)], atol=1e-7)
     assert observation.dtype == np.float32
-    assert info == {"start_yaw_deg": -12.5, "target_yaw_deg": 20.0}
+    assert info == pytest.approx({"start_yaw_deg": -12.5, "target_yaw_deg": 20.0}, abs=1e-12)
     assert all(type(value) is float for value in info.values())
 
 
@@ -102,7 +111,7 @@ def test_one_chosen_and_the_other_drawn() -> None:
     _, drawn = env.reset(seed=3)
     for name in drawn:
         _, info = env.reset(seed=3, options={name: 7.0})
-        assert info == drawn | {name: 7.0}
+        assert info == pytest.approx(drawn | {name: 7.0}, abs=1e-12)
 
 
 def test_seeds() -> None:
@@ -130,7 +139,9 @@ def test_draws_are_of_the_whole_range() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"start": 3.0}, r"unknown reset options \['start'\]; there are start_yaw_deg and target_yaw_deg"),
+        ({"yaw": 3.0}, r"unknown reset options \['yaw'\]; there are start_yaw_deg, target_yaw_deg \[deg\], and start"),
+        ({"start": 3.0}, "start is an orientation of four finite numbers"),
+        ({"target": [0.0, 0, 0, 0]}, "zero quaternion"),
         ({"start_yaw_deg": float("nan")}, "start_yaw_deg is one finite number of degrees, got nan"),
         ({"target_yaw_deg": float("inf")}, "target_yaw_deg is one finite number"),
         ({"target_yaw_deg": [1.0, 2.0]}, r"target_yaw_deg is one finite number of degrees, got \[1.0, 2.0\]"),
@@ -163,9 +174,14 @@ def test_a_step_needs_a_reset_before_it() -> None:
     ("options", "message"),
     [
         ({"plant": "mojoco"}, "unknown plant 'mojoco'"),
-        ({"plant": LowPassPlant(), "plant_options": {"step_s": 0.01}}, "plant_options go with a plant's name"),
+        ({"plant": LinearPlant(), "plant_options": {"step_s": 0.01}}, "plant_options go with a plant's name"),
         ({"plant": "lpf", "band": 2.0}, "settling band"),
         ({"plant": "lpf", "driven": ("motor1",)}, "cannot drive"),
+        ({"plant": "lpf", "bend": 0.01}, "no such option.*'bend'"),
+        ({"plant": "lpf", "plant_options": {"eye": "thesis"}}, "plant 'lpf'.*'eye'.*its options are surrogate"),
+        ({"plant": "lpf", "weights": (1.0, 2.0)}, "4 weights, accuracy, energy, duration, overshoot"),
+        ({"plant": "lpf", "weights": (0.0, 0.0, 0.0, 0.0)}, "not all 0"),
+        ({"plant": "lpf", "render_mode": "ansi"}, "render"),
     ],
 )
 def test_bad_environments_are_refused(options: dict[str, Any], message: str) -> None:
@@ -176,63 +192,63 @@ def test_bad_environments_are_refused(options: dict[str, Any], message: str) -> 
 
 
 def test_plant_and_task_options_arrive() -> None:
-    env = SaccadeEnv("mujoco", plant_options={"eye": "eve_v3", "threads": 1}, variant=2, C=50.0, horizon_s=0.3)
+    env = SaccadeEnv("mujoco", plant_options={"eye": "eve_v3", "threads": 1}, case=Case("2", 50.0), horizon_s=0.3)
     assert env.task.plant.identity()["eye"] == "eve_v3"
-    assert (env.task.variant, env.task.C, env.task.horizon_s) == (2, 50.0, 0.3)
+    assert (env.task.actions.pulse, env.task.actions.C, env.task.horizon_s) == ("2", 50.0, 0.3)
     by_case = SaccadeEnv("lpf", case="2-varying").task
-    assert (by_case.variant, by_case.onset, by_case.weights.accuracy) == (2, "varying", 8.70e7)
-    assert SaccadeEnv("mujoco").task.weights == CASES["1"].weights("mujoco")  # solved on that plant
-    three = SaccadeEnv("mujoco", driven=("motor1", "motor2", "motor3"))
+    assert (by_case.actions.pulse, by_case.actions.C, by_case.weights["accuracy"]) == ("2", "varying", 8.70e7)
+    assert SaccadeEnv("mujoco").task.weights["accuracy"] == 4.08e7  # solved on that plant
+    given = SaccadeEnv("lpf", weights=(4.0, 3.0, 2.0, 1.0)).task
+    assert given.weights == {"accuracy": 4.0, "energy": 3.0, "duration": 2.0, "overshoot": 1.0}
+    assert given.weights == SaccadeEnv("lpf", weights=given.weights).task.weights
+    three = SaccadeEnv("mujoco", driven=("motor1", "motor2", "motor3"), weights=(1.0, 1.0, 1.0, 1.0))
     assert three.action_space.shape == (9,)
-    plant = LowPassPlant(Surrogate(1.0, 10.0))
+    plant = LinearPlant(Surrogate(1.0, 10.0))
     assert SaccadeEnv(plant).task.plant is plant
-    np.testing.assert_array_equal(SaccadeEnv("lpf").task.action_low, [[18, -80, 5]])
-    np.testing.assert_array_equal(SaccadeEnv("lpf").task.action_high, [[80, 80, 40]])
-    np.testing.assert_array_equal(SaccadeEnv("mujoco").task.action_high, [[80, 40, 40]])
+    np.testing.assert_array_equal(SaccadeEnv("lpf").task.actions.low, [18, -80, 5])
+    np.testing.assert_array_equal(SaccadeEnv("lpf").task.actions.high, [80, 80, 40])
+    np.testing.assert_array_equal(SaccadeEnv("mujoco").task.actions.high, [80, 40, 40])
 
 
 # --- a step ---------------------------------------------------------------------------------------
 
 
 def test_action_and_scaled_action() -> None:
-    task = SaccadeTask(make_plant("mujoco"), ("motor1", "motor2"))
+    task = SaccadeTask.of_case(make_plant("mujoco"), driven=("motor1", "motor2"), weights=(1.0, 1.0, 1.0, 1.0))
+    actions = task.actions
+    assert actions.names == ("B_motor1", "D_motor1", "k0_motor1", "B_motor2", "D_motor2", "k0_motor2")
     scaled = np.array([[-1.0, 0, 1, 0.5, -0.5, 0]])
-    action = to_action(task, scaled)
-    np.testing.assert_allclose(action, [[[18, 0, 40], [64.5, -20, 22.5]]], rtol=1e-15)
-    np.testing.assert_allclose(to_scaled(task, action), scaled, atol=1e-15)
-    np.testing.assert_array_equal(to_action(task, 3 * np.sign(scaled)), to_action(task, np.sign(scaled)))
+    action = actions.from_unit(scaled)
+    np.testing.assert_allclose(action, [[18, 0, 40, 64.5, -20, 22.5]], rtol=1e-15)
+    np.testing.assert_allclose(actions.to_unit(action), scaled, atol=1e-15)
+    np.testing.assert_array_equal(actions.from_unit(3 * np.sign(scaled)), actions.from_unit(np.sign(scaled)))
     rng = np.random.default_rng(0)
     many = rng.uniform(-1, 1, (100, 6))
-    np.testing.assert_allclose(to_scaled(task, to_action(task, many)), many, atol=1e-14)
+    np.testing.assert_allclose(actions.to_unit(actions.from_unit(many)), many, atol=1e-14)
 
 
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_good_saccade(plant: str) -> None:
     """0 to 30 deg with B = 35, k0 = 17.5 and the D that lands there (thesis 4.4.5)."""
-    env = SaccadeEnv(plant, variant=1, **options_of(plant))
+    env = SaccadeEnv(plant, **options_of(plant))
     env.reset(options={"start_yaw_deg": 0.0, "target_yaw_deg": 30.0})
-    D = float(env.task.lands_on(horizontal(30.0))[0, 0])
-    action = to_scaled(env.task, np.array([[[35.0, D, 17.5]]]))[0]
+    D = float(env.task.actions.likely(from_yaw([30.0]))[0, 1])
+    action = env.task.actions.to_unit(np.array([[35.0, D, 17.5]]))[0]
     observation, reward, terminated, truncated, info = env.step(action.astype(np.float32))
     assert (terminated, truncated) == (True, False)
     np.testing.assert_allclose(observation, [*from_yaw(30.0), *from_yaw(30.0)], atol=1e-6)
     assert info["final_yaw_deg"] == pytest.approx(30, abs=1e-4)
-    assert (info["B"], info["D"], info["k0"]) == pytest.approx((35.0, D, 17.5), rel=1e-6)
-    assert info["F"] == pytest.approx(0, abs=1e-9)
+    assert (info["B"], info["D_deg"], info["k0"]) == pytest.approx((35.0, D, 17.5), rel=1e-6)
+    assert info["F_deg"] == pytest.approx(0, abs=1e-9)
     assert info["amplitude_deg"] == pytest.approx(30, abs=1e-4)
-    assert 0.1 < info["settling_time_s"] < 0.3
+    assert 100 < info["duration_ms"] < 300
     assert 300 < info["peak_velocity_deg_s"] < 500
     assert 0.5 < info["skewness"] < 1
     assert not info["failed"]
     assert not info["saturated"]
-    weights = env.task.weights
-    assert reward == info["reward_total"] == pytest.approx(
-        weights.accuracy * info["reward_accuracy"]
-        + weights.energy * info["reward_energy"]
-        + weights.duration * info["reward_duration"]
-        + weights.overshoot * info["reward_overshoot"],
-        rel=1e-12,
-    )  # fmt: skip
+    terms = [info[f"reward_{name}"] for name in env.task.weights]
+    assert len(terms) == 4
+    assert reward == info["reward"] == pytest.approx(sum(terms), rel=1e-12)
     if plant == "lpf":
         assert info["peak_velocity_deg_s"] == pytest.approx(30 * 35 / np.e, rel=1e-5)
         assert reward == pytest.approx(-70546, rel=1e-3)  # spec: the optimum there
@@ -240,13 +256,13 @@ def test_a_good_saccade(plant: str) -> None:
         assert isinstance(value, (float, int, bool)), name
 
 
-def test_info_of_three_motors_holds_three_numbers() -> None:
-    env = SaccadeEnv("mujoco", driven=("motor1", "motor2", "motor3"))
+def test_info_of_three_motors_names_their_numbers() -> None:
+    env = SaccadeEnv("mujoco", driven=("motor1", "motor2", "motor3"), weights=(1.0, 1.0, 1.0, 1.0))
     env.reset(seed=0)
     info = env.step(np.zeros(9, np.float32))[4]
-    for name in ("B", "D", "k0", "F"):
-        assert info[name].shape == (3,)
-    assert isinstance(info["reward_total"], float)
+    for name in ("B_{}", "D_{}_deg", "k0_{}", "F_{}_deg"):
+        assert all(isinstance(info[name.format(f"motor{i}")], float) for i in (1, 2, 3))
+    assert isinstance(info["reward"], float)
 
 
 def test_actions_beyond_the_bounds_are_clipped() -> None:
@@ -256,7 +272,7 @@ def test_actions_beyond_the_bounds_are_clipped() -> None:
         env.reset(seed=2)
         results.append(env.step(scale * np.array([1.0, -1.0, 1.0], np.float32))[4])
     assert results[0] == results[1]
-    assert (results[0]["B"], results[0]["D"], results[0]["k0"]) == (80, -80, 40)
+    assert (results[0]["B"], results[0]["D_deg"], results[0]["k0"]) == (80, -80, 40)
 
 
 def test_log_reward() -> None:
@@ -306,18 +322,20 @@ def test_batch_and_single_give_the_same_numbers(plant: str, log: bool) -> None:
     many = SaccadeVecEnv(count, plant, log_reward=log, seed=0, **options)
     one = SaccadeEnv(plant, log_reward=log, **options)
     started = many.reset()
-    start, target = many.yaw_deg
+    start, target = (to_euler(q)[0] for q in (many.batch.start.orientation, many.batch.target))
     actions = rng.uniform(-0.6, 0.6, (count, 3)).astype(np.float32)
     _, rewards, dones, infos = many.step(actions)
     assert dones.all()
     assert rewards.dtype == np.float32
     for i in range(count):
         observation, _ = one.reset(options={"start_yaw_deg": start[i], "target_yaw_deg": target[i]})
-        np.testing.assert_array_equal(started[i], observation)
-        ended, reward, _, _, _ = one.step(actions[i])
+        np.testing.assert_allclose(started[i], observation, atol=1e-7)
+        ended, reward, _, _, info = one.step(actions[i])
         assert rewards[i] == pytest.approx(reward, rel=1e-6)
         np.testing.assert_allclose(infos[i]["terminal_observation"], ended, atol=1e-6)
         assert infos[i]["TimeLimit.truncated"] is False
+        for name, value in info.items():
+            assert infos[i][name] == pytest.approx(value, rel=1e-6, abs=1e-6), name
 
 
 def test_batch_begins_anew_with_every_step() -> None:
@@ -326,7 +344,7 @@ def test_batch_begins_anew_with_every_step() -> None:
     second, _, _, infos = env.step(np.zeros((4, 3), np.float32))
     second = np.asarray(second)
     assert (first != second).any(axis=1).all()
-    np.testing.assert_allclose(second, observe(horizontal(env.yaw_deg[0]), horizontal(env.yaw_deg[1])), atol=1e-7)
+    np.testing.assert_allclose(second, observe(env.batch.start.orientation, env.batch.target), atol=1e-7)
     for info, begun in zip(infos, first, strict=True):
         np.testing.assert_array_equal(info["terminal_observation"][4:], begun[4:])  # the target of the ended one
         landed = to_euler(info["terminal_observation"][:4].astype(float))[0]
@@ -336,11 +354,11 @@ def test_batch_begins_anew_with_every_step() -> None:
 def test_batch_of_chosen_saccades() -> None:
     env = SaccadeVecEnv(3, "mujoco", seed=0)
     start, target = np.array([0.0, -5.0, 20.0]), np.array([10.0, 15.0, -30.0])
-    observation = env.begin(start, target)
+    observation = env.begin(*saccades(env.task.targets, start[:, None], target[:, None]))
     np.testing.assert_allclose(observation, observe(from_yaw(start), from_yaw(target)), atol=1e-7)
-    D = env.task.lands_on(from_yaw(target))[:, 0]
-    action = np.stack([np.full(3, 40.0), D, np.full(3, 17.5)], axis=-1)[:, None]
-    env.step(to_scaled(env.task, action).astype(np.float32))
+    D = env.task.actions.likely(from_yaw(target))[:, 1]
+    action = np.stack([np.full(3, 40.0), D, np.full(3, 17.5)], axis=-1)
+    env.step(env.task.actions.to_unit(action).astype(np.float32))
     assert env.outcome is not None
     np.testing.assert_allclose(to_euler(env.outcome.measures.final)[0], target, atol=1e-3)
     np.testing.assert_allclose(env.outcome.measures.amplitude_deg, np.abs(target - start), atol=1e-3)
@@ -421,9 +439,9 @@ def test_stable_baselines3_learns_on_it(plant: str) -> None:
     assert (replay.timeouts[:filled] == 0).all()
     np.testing.assert_array_equal(replay.next_observations[:filled, :, 4:], replay.observations[:filled, :, 4:])
     task = env.venv.task
-    start = task.fixate(replay.observations[3, :, :4].astype(float))
+    start = task.targets.rest(replay.observations[3, :, :4].astype(float))
     target = replay.observations[3, :, 4:].astype(float)
-    again = task.perform(start, to_action(task, replay.actions[3]), target)
+    again = task.perform(start, task.actions.from_unit(replay.actions[3]), target)
     np.testing.assert_allclose(replay.rewards[3], log_reward(again.reward.total), atol=1e-4)
     action, _ = model.predict(np.asarray(env.reset()), deterministic=True)
     assert action.shape == (8, 3)
@@ -435,3 +453,125 @@ def test_the_environment_of_a_surrogate(tmp_path: Any) -> None:
     env.reset(options={"start_yaw_deg": 0.0, "target_yaw_deg": 10.0})
     info = env.step(np.array([0.0, 0.25, 0.0], np.float32))[4]
     assert info["final_yaw_deg"] == pytest.approx(2.0 * 20.0)
+
+
+# --- what one asks of all three -------------------------------------------------------------------
+
+
+def test_options_of_the_sb3_batch() -> None:
+    """`set_options` takes effect at the next reset, and once; the same for all, or one for each."""
+    env = SaccadeVecEnv(3, seed=0)
+    env.set_options({"start_yaw_deg": 5.0, "target_yaw_deg": -10.0})
+    chosen = np.asarray(env.reset())
+    np.testing.assert_allclose(chosen, observe(from_yaw([5.0] * 3), from_yaw([-10.0] * 3)), atol=1e-7)
+    env.set_options([{"target_yaw_deg": angle} for angle in (1.0, 2.0, 3.0)])
+    np.testing.assert_allclose(np.asarray(env.reset())[:, 4:], from_yaw([1.0, 2.0, 3.0]), atol=1e-7)
+    assert (np.asarray(env.reset())[:, 4:] != from_yaw([1.0, 2.0, 3.0]).astype(np.float32)).any()
+    env.set_options({"yaw": 3.0})
+    with pytest.raises(InputError, match="unknown reset options"):
+        env.reset()
+
+
+def test_reset_by_orientation() -> None:
+    env = SaccadeEnv("mujoco")
+    observation, info = env.reset(options={"start": from_yaw(-4.0), "target": 3 * from_yaw(12.0)})
+    np.testing.assert_allclose(observation, [*from_yaw(-4.0), *from_yaw(12.0)], atol=1e-7)
+    assert info == pytest.approx({"start_yaw_deg": -4.0, "target_yaw_deg": 12.0}, abs=1e-9)
+
+
+@pytest.mark.parametrize("plant", ["lpf", "mujoco"])
+@pytest.mark.usefixtures("warnings_are_errors")
+def test_gymnasiums_vector_environment(plant: str) -> None:
+    """The numbers of the SB3 batch; SAME_STEP autoreset, whose `final_obs` and `final_info` are the ended saccades'."""
+    envs = gymnasium.make_vec(ID, num_envs=4, vectorization_mode="vector_entry_point", plant=plant, log_reward=True)
+    assert isinstance(envs.unwrapped, SaccadeVectorEnv)
+    observations, infos = envs.reset(seed=0)
+    assert envs.observation_space.contains(observations)
+    assert infos == {}
+    start, target = observations[:, :4].astype(float), observations[:, 4:].astype(float)
+    envs.action_space.seed(0)
+    actions = envs.action_space.sample()
+    following, rewards, terminations, truncations, infos = envs.step(actions)
+    assert envs.observation_space.contains(following)
+    assert (terminations.all(), truncations.any()) == (True, False)
+    assert (following != observations).any(axis=1).all()
+    np.testing.assert_allclose(infos["final_obs"][:, 4:], target, atol=1e-7)
+    told = infos["final_info"]
+    assert {"B", "D_deg", "k0", "duration_ms", "overshoot", "reward", "reward_energy"} <= set(told)
+    np.testing.assert_allclose(told["start_yaw_deg"], to_euler(start)[0], atol=1e-4)
+    np.testing.assert_allclose(rewards, log_reward(told["reward"]))
+    one = SaccadeEnv(plant, log_reward=True)
+    for i in range(4):
+        one.reset(options={"start": start[i], "target": target[i]})
+        assert one.step(actions[i])[1] == pytest.approx(rewards[i], rel=1e-4)
+    again, _ = envs.reset(seed=0)
+    np.testing.assert_array_equal(again, observations)
+    chosen, _ = envs.reset(options={"target_yaw_deg": [1.0, 2.0, 3.0, 4.0]})
+    np.testing.assert_allclose(chosen[:, 4:], from_yaw([1.0, 2.0, 3.0, 4.0]), atol=1e-7)
+    envs.close()
+
+
+def test_neither_torch_nor_stable_baselines3_is_loaded() -> None:
+    code = (
+        "import sys, gymnasium, orient_eye; gymnasium.make('OrientEye/Saccade-v0', plant='mujoco');"
+        "gymnasium.make_vec('OrientEye/Saccade-v0', 2, 'vector_entry_point');"
+        "assert not {'torch', 'stable_baselines3', 'rerun', 'matplotlib'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def draws() -> None:
+    """Skips where MuJoCo cannot draw."""
+    try:
+        still(ball(), np.array([1.0, 0, 0, 0]), {}, size=(16, 16))
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("plant", ["lpf", "mujoco"])
+@pytest.mark.usefixtures("draws")
+def test_frames_of_the_whole_movement(plant: str, tmp_path: Any) -> None:
+    """An episode is one step, so its frames are the movement's, from the start to its end, evenly in time."""
+    env = SaccadeEnv(plant, render_mode="rgb_array_list", horizon_s=0.3)
+    env.reset(options={"start_yaw_deg": 20.0, "target_yaw_deg": -20.0})
+    (before,) = env.render()
+    env.step(env.task.actions.to_unit(np.array([[40.0, env.task.actions.likely(from_yaw([-20.0]))[0, 1], 17.0]]))[0])
+    shown = env.render()
+    assert len(shown) == 91  # 0.3 s, ten times slower, at 30 a second
+    assert all(picture.shape == before.shape == (360, 480, 3) for picture in shown)
+    np.testing.assert_array_equal(shown[0], before)
+    assert (shown[0] != shown[-1]).any(axis=2).mean() > 0.02
+    film = write_film(shown[:5], tmp_path / "saccade.gif")
+    with Image.open(film) as opened:
+        assert opened.n_frames == 5
+    with pytest.raises(InputError, match=r"NAME.gif"):
+        write_film(shown, tmp_path / "saccade.mp4")
+
+
+@pytest.mark.usefixtures("draws", "warnings_are_errors")
+def test_one_picture() -> None:
+    env = gymnasium.make(ID, plant="mujoco", render_mode="rgb_array")
+    check_env(env.unwrapped)
+    env.reset(seed=0)
+    before = env.render()
+    env.step(env.action_space.sample())
+    assert (before != env.render()).any()
+    envs = SaccadeVectorEnv(2, render_mode="rgb_array_list")
+    envs.reset(seed=0)
+    envs.step(envs.action_space.sample())
+    assert [len(each) for each in envs.render()] == [151, 151]
+
+
+def test_human_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    env = SaccadeEnv(render_mode="human")
+    env.reset(seed=0)
+    if sys.platform == "linux":
+        with pytest.raises(InputError, match="no screen"):
+            env.step(np.zeros(3, np.float32))
+    env.close()

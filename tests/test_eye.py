@@ -1,4 +1,4 @@
-"""Facts of the eye: the MJCF, its presets, and what `orient_eye.eyes` reads from them."""
+"""Facts of the eyes: what holds for every entry of `EYES`, and the numbers of the thesis' eye and its other preset."""
 
 import importlib.util
 import re
@@ -14,23 +14,18 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orient_eye.errors import InputError
-from orient_eye.eyes import (
-    EYES,
-    STANDARD_GRAVITY,
-    Elastics,
-    build_model,
-    model_hash,
-    motor_names,
-    motor_range_deg,
-    tendon_tension,
-)
-from orient_eye.plants import Plant
+from orient_eye.eyes import EYES
+from orient_eye.eyes.elastics import Elastics
+from orient_eye.eyes.model import STANDARD_GRAVITY, ball, build_model, model_hash, motors, tendon_tension
+from orient_eye.motor import names, ranges
+from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import TavaresPlant
 from orient_eye.resources import data_folder
 from orient_eye.rotations import rotation, to_euler
 
 Array = NDArray[np.float64]
+EYE3 = ("thesis", "eve_v3")
 MOTORS = ("motor1", "motor2", "motor3")
 TENDONS = ("motor1_upper", "motor1_lower", "motor2_right", "motor2_left", "motor3_upper", "motor3_lower")
 SCRIPT = Path(__file__).parents[1] / "scripts" / "make_meshes.py"
@@ -64,23 +59,47 @@ def pose(model: mujoco.MjModel, seed: int = 0) -> mujoco.MjData:
     data = mujoco.MjData(model)
     data.joint("eye").qpos = Rotation.random(rng=rng).as_quat(scalar_first=True)
     data.joint("eye").qvel = rng.normal(size=3)
-    for name in MOTORS:
-        data.joint(name).qpos = rng.uniform(-0.5, 0.5)
+    for joint in arms(model):
+        data.joint(joint).qpos = rng.uniform(-0.5, 0.5)
     mujoco.mj_forward(model, data)
     return data
 
 
+def arms(model: mujoco.MjModel) -> list[int]:
+    """Joints of the motors."""
+    return [int(model.actuator(name).trnid[0]) for name in names(motors(model))]
+
+
 @pytest.fixture(params=EYES)
-def preset(request: pytest.FixtureRequest) -> str:
+def eye(request: pytest.FixtureRequest) -> str:
+    """Every eye there is."""
     return str(request.param)
+
+
+@pytest.fixture(params=EYE3)
+def preset(request: pytest.FixtureRequest) -> str:
+    """Those of eye3.xml, whose numbers stand here."""
+    return str(request.param)
+
+
+def test_motors_are_read_from_the_model(eye: str) -> None:
+    model = build_model(eye)
+    found = motors(model)
+    assert len(set(names(found))) == len(found) > 0
+    assert np.isfinite(ranges(found)).all()
+    for motor, joint, (low, high) in zip(found, arms(model), ranges(found), strict=True):
+        assert model.actuator_ctrllimited[model.actuator(motor.name).id]
+        np.testing.assert_allclose(np.deg2rad([low, high]), model.actuator(motor.name).ctrlrange, rtol=1e-15)
+        assert low <= motor.working[0] < motor.working[1] <= high
+        assert (motor.unit, model.joint(joint).type) == ("deg", mujoco.mjtJoint.mjJNT_HINGE)
 
 
 def test_motors_are_the_three_actuators_with_limits(preset: str) -> None:
     model = build_model(preset)
-    assert motor_names(model) == MOTORS
+    assert names(motors(model)) == MOTORS
     assert model.nu == 3
-    assert model.actuator_ctrllimited.all()
-    np.testing.assert_allclose(motor_range_deg(model), [[-80, 80]] * 3)
+    np.testing.assert_allclose(ranges(motors(model)), [[-80, 80]] * 3)
+    assert [motor.working for motor in motors(model)] == [(-40, 40)] * 3
     for name in MOTORS:
         assert model.actuator(name).trnid[0] == model.joint(name).id
 
@@ -90,16 +109,17 @@ def test_tendons_are_named_by_motor_and_side(preset: str) -> None:
     assert tuple(model.tendon(i).name for i in range(model.ntendon)) == TENDONS
 
 
-def test_sensors_show_the_state(preset: str) -> None:
-    model = build_model(preset)
+def test_sensors_show_the_state(eye: str) -> None:
+    model = build_model(eye)
     data = pose(model)
-    eye = data.joint("eye")
-    np.testing.assert_allclose(data.sensor("orientation").data, eye.qpos, atol=1e-12)
-    in_head = rotation(eye.qpos).apply(eye.qvel)  # a ball joint's velocity is in the eye's frame
+    joint = data.joint("eye")
+    np.testing.assert_allclose(data.sensor("orientation").data, joint.qpos, atol=1e-12)
+    in_head = rotation(joint.qpos).apply(joint.qvel)  # a ball joint's velocity is in the eye's frame
     np.testing.assert_allclose(data.sensor("angular_velocity").data, in_head, atol=1e-12)
-    for name in TENDONS:
+    for i in range(model.ntendon):
+        name = model.tendon(i).name
         assert data.sensor(f"length_{name}").data[0] == data.tendon(name).length[0]
-    assert model.nsensor == 2 + len(TENDONS)
+    assert model.nsensor == 2 + model.ntendon
 
 
 def test_tension_from_the_length_sensors_makes_the_torque(preset: str) -> None:
@@ -139,9 +159,9 @@ def test_elastics_are_those_of_the_author(preset: str) -> None:
     assert elastics.friction == 0.02
 
 
-def linearised(plant: Plant) -> tuple[Array, Array]:
+def linearised(plant: ElasticPlant) -> tuple[Array, Array]:
     """Restoring stiffness about x, y, z and torque per motor [N m/rad], both (3, 3), at rest."""
-    torque, step, still = plant._torque, 1e-6, np.zeros((3, 3))
+    torque, step, still = plant.torque, 1e-6, np.zeros((3, 3))
     forward = np.tile([1.0, 0, 0, 0], (3, 1))
     turned = [Rotation.from_rotvec(sign * step * np.eye(3)).as_quat(scalar_first=True) for sign in (1, -1)]
     moved = [np.rad2deg(sign * step * np.eye(3)) for sign in (1, -1)]
@@ -170,22 +190,22 @@ def test_eve_v3_linearised_at_rest(kind: type[TavaresPlant] | type[MujocoPlant])
 def test_static_yaw_of_the_thesis_eye() -> None:
     motor2 = np.array([25, 30, 36, 40, 50, 60, 80])
     motor = np.column_stack([0 * motor2, motor2, 0 * motor2])
-    yaw, pitch, roll = to_euler(MujocoPlant().rest_orientation(motor))
+    yaw, pitch, roll = to_euler(MujocoPlant().rest(motor))
     np.testing.assert_allclose(yaw, [37.3, 45.1, 55.0, 61.8, 79.3, 92.4, 105.0], atol=0.06)
     np.testing.assert_allclose([pitch, roll], 0, atol=1e-6)
 
 
 @pytest.mark.parametrize("step_s", [5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3])
-def test_arms_stand_on_the_command_one_step_later(preset: str, step_s: float) -> None:
-    model = build_model(preset, step_s=step_s)
+def test_arms_stand_on_the_command_one_step_later(eye: str, step_s: float) -> None:
+    model = build_model(eye, step_s=step_s)
     assert model.opt.timestep == step_s
     data = mujoco.MjData(model)
     rng = np.random.default_rng(1)
     for _ in range(50):
-        data.ctrl[:] = rng.uniform(-0.7, 0.7, 3)
+        data.ctrl[:] = rng.uniform(-0.7, 0.7, model.nu)
         mujoco.mj_step(model, data)
-        arms = [data.joint(name).qpos[0] for name in MOTORS]
-        np.testing.assert_allclose(arms, data.ctrl, atol=3e-6)  # 2e-4 deg
+        stand = [data.joint(joint).qpos[0] for joint in arms(model)]
+        np.testing.assert_allclose(model.actuator_gear[:, 0] * stand, data.ctrl, atol=3e-6)  # 2e-4 deg
 
 
 def test_file_alone_is_the_thesis_preset_at_1_ms() -> None:
@@ -194,26 +214,26 @@ def test_file_alone_is_the_thesis_preset_at_1_ms() -> None:
     assert model_hash(bare) == model_hash(build_model("thesis", step_s=0.001))
 
 
-def test_gravity_adds_only_the_torque_of_the_centre_of_mass(preset: str) -> None:
-    model, without = build_model(preset, gravity=True), build_model(preset)
-    assert motor_names(model) == motor_names(without) == MOTORS
+def test_gravity_adds_only_the_torque_of_the_centre_of_mass(eye: str) -> None:
+    model, without = build_model(eye, gravity=True), build_model(eye)
+    assert motors(model) == motors(without)
     assert model.nu == without.nu + 1
-    np.testing.assert_array_equal(motor_range_deg(model), motor_range_deg(without))
+    weight = np.array([0, 0, -STANDARD_GRAVITY * model.body("eye").mass[0]])
+    centre = model.site("centre_of_mass").pos
     for seed in range(5):
         data, reference = pose(model, seed), pose(without, seed)
-        for name in MOTORS:
+        for name in names(motors(model)):
             data.actuator(name).ctrl = reference.actuator(name).ctrl = 0.3
         data.actuator("gravity").ctrl = 123.0  # no control
         mujoco.mj_forward(model, data)
         mujoco.mj_forward(without, reference)
         turn = rotation(data.joint("eye").qpos)
-        weight = np.array([0, 0, -0.248 * STANDARD_GRAVITY])
         torque = turn.apply(data.joint("eye").qfrc_actuator)
-        np.testing.assert_allclose(torque, np.cross(turn.apply([0.02, 0, 0]), weight), atol=1e-14)
+        np.testing.assert_allclose(torque, np.cross(turn.apply(centre), weight), atol=1e-14)
         np.testing.assert_array_equal(data.qfrc_passive, reference.qfrc_passive)
-        for name in MOTORS:
+        for name, joint in zip(names(motors(model)), arms(model), strict=True):
             assert data.actuator(name).ctrl[0] == 0.3
-            assert data.joint(name).qfrc_actuator[0] == reference.joint(name).qfrc_actuator[0]
+            assert data.joint(joint).qfrc_actuator[0] == reference.joint(joint).qfrc_actuator[0]
 
 
 def test_unknown_preset_names_the_known_ones() -> None:
@@ -227,17 +247,30 @@ def test_bad_step_is_refused(step_s: float) -> None:
         build_model(step_s=step_s)
 
 
-def test_meshes_have_no_part_in_the_physics(preset: str) -> None:
-    model = build_model(preset)
+def test_meshes_have_no_part_in_the_physics(eye: str) -> None:
+    model, chosen = build_model(eye), EYES[eye]
     assert not model.geom_contype.any()
     assert not model.geom_conaffinity.any()
-    spec = mujoco.MjSpec.from_file(str(data_folder("eye_mjcf") / "eye3.xml"))
-    EYES[preset](spec)
+    spec = mujoco.MjSpec.from_file(str(data_folder("eye_mjcf") / chosen.file))
+    if chosen.change is not None:
+        chosen.change(spec)
     spec.compiler.discardvisual = True
     bare = spec.compile()
     assert bare.ngeom == 0
+    assert model_hash(bare) == model_hash(model) == model_hash(build_model(eye, visual=False))
     for field in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_armature", "dof_damping"):
         np.testing.assert_array_equal(getattr(model, field), getattr(bare, field))
+
+
+def test_the_ball_is_an_eye_that_nothing_moves() -> None:
+    model = ball()
+    assert (model.nu, model.ntendon, model.njnt) == (0, 0, 1)
+    assert model.joint("eye").type == mujoco.mjtJoint.mjJNT_BALL
+    thesis = build_model()
+    np.testing.assert_array_equal(model.site("gaze").pos, thesis.site("gaze").pos)
+    for name in ("sclera", "limbus", "iris", "pupil"):
+        np.testing.assert_array_equal(model.geom(name).size, thesis.geom(name).size)
+        np.testing.assert_array_equal(model.geom(name).pos, thesis.geom(name).pos)
 
 
 # --- scripts/make_meshes.py ---------------------------------------------------------------------

@@ -1,7 +1,13 @@
 """What is read and written: motor commands, trajectories, surrogates; whole or not at all, and errors that help."""
 
+import io
 import json
 import os
+import shutil
+import stat
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +19,24 @@ from numpy.typing import NDArray
 
 from orient_eye.commands.motor_file import read_command, rest_position
 from orient_eye.errors import InputError
-from orient_eye.files import write_atomically, write_text
+from orient_eye.files import remove_leftovers, write_atomically, write_table, write_text
 from orient_eye.movement.trajectory import Trajectory, concatenate, motor_column
 from orient_eye.plants import Plant, make_plant
-from orient_eye.plants.lpf import LowPassPlant
+from orient_eye.plants.linear import LinearPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.rotations import from_yaw
+from orient_eye.run_directory import RunDirectory
 from orient_eye.surrogate import Surrogate
 
 Array = NDArray[np.float64]
+
+posix = pytest.mark.skipif(os.name != "posix", reason="permissions, links and pipes are POSIX'")
+
+
+def run(code: str, *arguments: str | Path, check: bool = True, **options: Any) -> "subprocess.CompletedProcess[str]":
+    """Python code in a process of its own."""
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    return subprocess.run([sys.executable, "-c", code, *map(str, arguments)], text=True, check=check, **options)
 
 
 # --- motor commands -------------------------------------------------------------------------------
@@ -60,7 +75,7 @@ def test_uneven_sampling(tmp_path_factory: pytest.TempPathFactory, gaps: list[fl
     tau = np.random.default_rng(seed).uniform(-40, 40, len(t))
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(t.tolist(), tau.tolist(), strict=True))
     path = write(tmp_path_factory.mktemp("csv"), f"t_s,tau2_deg\n{rows}\n")
-    plant = LowPassPlant()
+    plant = LinearPlant()
     if t[-1] - t[0] < 2e-3:
         return
     command = read_command(path, plant)[0, :, 0]
@@ -72,14 +87,14 @@ def test_uneven_sampling(tmp_path_factory: pytest.TempPathFactory, gaps: list[fl
 def test_jumps(tmp_path: Path) -> None:
     """Two rows at one time: the later holds from that time on; the first row is the rest before it."""
     path = write(tmp_path, "t_s,tau2_deg\n0,5\n0,20\n0.003,20\n0.003,7\n0.003,8\n0.0055,8\n0.0055,-1\n0.008,-1\n")
-    plant = LowPassPlant()
+    plant = LinearPlant()
     np.testing.assert_array_equal(read_command(path, plant)[0, :, 0], [20, 20, 20, 8, 8, 8, -1, -1, -1])
     np.testing.assert_array_equal(rest_position(path, plant), [[5]])
 
 
 def test_the_last_row_is_held_and_the_horizon_cuts(tmp_path: Path) -> None:
     path = write(tmp_path, "t_s,tau2_deg\n0,0\n0.004,8\n")
-    plant = LowPassPlant()
+    plant = LinearPlant()
     np.testing.assert_allclose(read_command(path, plant, horizon_s=0.006)[0, :, 0], [0, 2, 4, 6, 8, 8, 8], atol=1e-9)
     np.testing.assert_allclose(read_command(path, plant, horizon_s=0.002)[0, :, 0], [0, 2, 4], atol=1e-9)
     one_row = write(tmp_path, "t_s,tau2_deg\n0,12\n")
@@ -94,16 +109,16 @@ def test_columns_in_any_order_and_motors_left_out(tmp_path: Path, eye: Plant) ->
 
 def test_a_motor_the_plant_lacks_may_stand_at_0(tmp_path: Path) -> None:
     path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.001,0,2,0\n")
-    np.testing.assert_array_equal(read_command(path, LowPassPlant()), [[[1], [2]]])
+    np.testing.assert_array_equal(read_command(path, LinearPlant()), [[[1], [2]]])
     path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.001,0,2,0.5\n")
     with pytest.raises(InputError, match=r"'lpf' cannot be commanded by tau3_deg; its columns are t_s, tau2_deg"):
-        read_command(path, LowPassPlant())
+        read_command(path, LinearPlant())
 
 
 def test_spreadsheets_byte_order_mark_and_blank_lines(tmp_path: Path) -> None:
     path = tmp_path / "command.csv"
     path.write_bytes("\ufefft_s,tau2_deg\r\n0,1\r\n\r\n0.001,2\r\n\r\n".encode())
-    np.testing.assert_array_equal(read_command(path, LowPassPlant()), [[[1], [2]]])
+    np.testing.assert_array_equal(read_command(path, LinearPlant()), [[[1], [2]]])
 
 
 @pytest.mark.parametrize(
@@ -184,7 +199,7 @@ def same(one: Trajectory, other: Trajectory) -> None:
 @pytest.mark.parametrize("kind", ["tendons", "none"])
 def test_trajectory_npz_round_trip(tmp_path: Path, kind: str) -> None:
     """Bit for bit, failed saccades included, and nothing that needs pickle."""
-    one = trajectory() if kind == "tendons" else LowPassPlant().simulate(np.ones((2, 5, 1)))
+    one = trajectory() if kind == "tendons" else LinearPlant().simulate(np.ones((2, 5, 1)))
     path = one.save_npz(tmp_path / "new" / "folder" / "saccades.npz")
     assert path == tmp_path / "new" / "folder" / "saccades.npz"
     same(one, Trajectory.load_npz(path))
@@ -222,11 +237,11 @@ def test_trajectory_csv_round_trip(tmp_path: Path) -> None:
 
 def test_a_trajectorys_csv_is_a_command(tmp_path: Path) -> None:
     """Its tau columns can be simulated again: the rest of the columns is taken out first."""
-    one = LowPassPlant().simulate(np.linspace(0, 9, 12)[None, :, None])
+    one = LinearPlant().simulate(np.linspace(0, 9, 12)[None, :, None])
     lines = one.to_csv(tmp_path / "trajectory.csv").read_text(encoding="utf-8").splitlines()
     keep = [lines[0].split(",").index(name) for name in ("t_s", motor_column("motor2"))]
     text = "\n".join(",".join(line.split(",")[i] for i in keep) for line in lines)
-    np.testing.assert_allclose(read_command(write(tmp_path, text), LowPassPlant()), one.motor, atol=1e-7)
+    np.testing.assert_allclose(read_command(write(tmp_path, text), LinearPlant()), one.motor, atol=1e-7)
 
 
 def test_csv_of_a_batch_is_refused(tmp_path: Path) -> None:
@@ -278,13 +293,13 @@ def test_picking_and_joining_saccades() -> None:
     np.testing.assert_array_equal(one[1:].motor, one.motor[1:])
     np.testing.assert_array_equal(one[~one.failed].orientation, one.orientation[:2])
     same(one, concatenate([one[0], one[1:]]))
-    flat = LowPassPlant().simulate(np.ones((2, 12, 1)))
+    flat = LinearPlant().simulate(np.ones((2, 12, 1)))
     same(concatenate([flat[0], flat[1]]), flat)
-    for other in (flat, LowPassPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))):
+    for other in (flat, LinearPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))):
         with pytest.raises(InputError, match="same plant and the same times"):
             concatenate([one, other])
     with pytest.raises(InputError, match="same plant and the same times"):
-        concatenate([flat, LowPassPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))])
+        concatenate([flat, LinearPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))])
 
 
 # --- atomic writes --------------------------------------------------------------------------------
@@ -297,26 +312,28 @@ def test_a_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
         temporary.write_text("half of the n", encoding="utf-8")
         raise OSError("no space left")
 
-    with pytest.raises(OSError, match="no space left"):
+    with pytest.raises(InputError, match=r"cannot write .*result\.json: no space left; name another file"):
         write_atomically(path, fail)
     assert path.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_an_interrupted_write_keeps_the_old_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, RuntimeError, InputError])
+def test_an_interrupted_write_keeps_the_old_file(tmp_path: Path, error: type[BaseException]) -> None:
     path = write_text(tmp_path / "result.json", "old")
 
     def interrupt(temporary: Path) -> None:
-        raise KeyboardInterrupt
+        raise error("this one")
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(error, match=r"^this one$"):
         write_atomically(path, interrupt)
     assert path.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:
+def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_text(tmp_path / "result.txt", "old")
+    done: list[str] = []
 
     def look(temporary: Path) -> None:
         assert temporary.parent == tmp_path  # the same file system: the last step is one renaming
@@ -324,16 +341,241 @@ def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> Non
         temporary.write_text("new", encoding="utf-8")
         assert path.read_text(encoding="utf-8") == "old"
 
+    def noted(name: str) -> None:
+        function = getattr(os, name)
+
+        def call(*arguments: Any) -> None:
+            done.append(name)
+            function(*arguments)
+
+        monkeypatch.setattr(os, name, call)
+
+    noted("fsync")
+    noted("replace")
     assert write_atomically(path, look) == path
     assert path.read_text(encoding="utf-8") == "new"
     assert list(tmp_path.iterdir()) == [path]
+    assert done == ["fsync", "replace"]
 
 
-def test_folders_are_made_and_others_may_read(tmp_path: Path) -> None:
-    path = write_text(tmp_path / "a" / "b" / "note.txt", "grüße")
-    assert path.read_bytes() == "grüße".encode()
-    if os.name == "posix":
-        assert path.stat().st_mode & 0o777 == 0o644
+@posix
+def test_folders_are_made_and_permissions_are_the_users(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        path = write_text(tmp_path / "a" / "b" / "note.txt", "grüße")
+        assert path.read_bytes() == "grüße".encode()
+        assert path.stat().st_mode & 0o777 == 0o640
+        path.chmod(0o604)
+        write_text(path, "new")
+        assert path.stat().st_mode & 0o777 == 0o604
+    finally:
+        os.umask(before)
+
+
+@posix
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("file/out.txt", "Not a directory; a file stands where a folder is needed"),
+        ("file/new/out.txt", "Not a directory; a file stands where a folder is needed"),
+        (f"{'n' * 300}.txt", "name too long; shorten it"),
+        (f"{'n' * 300}/out.txt", "name too long; shorten it"),
+        ("folder", "Is a directory; name a file in it"),
+        ("nul\0.txt", r"cannot write '.*nul\\x00\.txt'?.*: a file name holds no NUL"),
+        ("loop/out.txt", "symbolic links; name another file"),
+    ],
+)
+def test_places_where_no_file_can_be(tmp_path: Path, name: str, message: str) -> None:
+    (tmp_path / "file").write_text("old")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "loop").symlink_to("loop")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=message):
+        write_text(tmp_path / name, "new")
+    if name != "folder":
+        with pytest.raises(InputError, match=message):
+            RunDirectory.create(tmp_path / name / "run", "simulate", {})
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@posix
+def test_places_that_may_not_be_written(tmp_path: Path) -> None:
+    """By a user without privileges, whatever the tests run as."""
+    code = """
+import os
+from pathlib import Path
+from orient_eye.errors import InputError
+from orient_eye.files import write_text
+from orient_eye.run_directory import RunDirectory
+if os.getuid() == 0:
+    os.setuid(65534)
+for write in (
+    lambda: write_text("closed/out.txt", "new"),
+    lambda: write_text("closed/new/out.txt", "new"),
+    lambda: write_text("kept.txt", "new"),
+    lambda: RunDirectory.create(Path("closed/run"), "simulate", {}),
+):
+    try:
+        write()
+    except InputError as error:
+        print(error)
+"""
+    closed, kept = tmp_path / "closed", write_text(tmp_path / "kept.txt", "old")
+    closed.mkdir()
+    for path, mode in ((closed, 0o555), (kept, 0o444), (tmp_path, 0o777)):
+        path.chmod(mode)
+    lines = run(code, cwd=tmp_path).stdout.splitlines()
+    assert len(lines) == 4
+    assert all("Permission denied; name a place that you may write to" in line for line in lines)
+    assert kept.read_text() == "old"
+    assert sorted(tmp_path.rglob("*")) == [closed, kept]
+
+
+@posix
+def test_symbolic_links_are_followed(tmp_path: Path) -> None:
+    real = write_text(tmp_path / "store" / "real.txt", "old")
+    link = tmp_path / "link.txt"
+    link.symlink_to("store/real.txt")
+    assert write_text(link, "new") == link
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+    dangling = tmp_path / "later.txt"
+    dangling.symlink_to("store/later.txt")
+    write_text(dangling, "new")
+    assert (tmp_path / "store" / "later.txt").read_text() == "new"
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["later.txt", "later.txt", "link.txt", "real.txt", "store"]
+
+
+@posix
+def test_a_pipe_is_written_to(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.npz"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as reader:
+        content = reader.submit(pipe.read_bytes)
+        write_atomically(pipe, lambda temporary: np.savez(temporary, a=np.arange(3)))
+    np.testing.assert_array_equal(np.load(io.BytesIO(content.result()))["a"], [0, 1, 2])
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert list(tmp_path.iterdir()) == [pipe]
+
+
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="no /dev/full, the device that is always full")
+def test_a_device_is_written_to(tmp_path: Path) -> None:
+    """One of our own for root, whom nothing keeps from replacing those of the machine."""
+    device = tmp_path / "out.txt"
+    if os.getuid():
+        device.symlink_to("/dev/full")
+    else:
+        try:
+            os.mknod(device, 0o666 | stat.S_IFCHR, os.stat("/dev/full").st_rdev)
+        except PermissionError:
+            pytest.skip("no device may be made here")
+    with pytest.raises(InputError, match=r"out\.txt: No space left on device; make room there"):
+        write_text(device, "anything")
+    assert device.is_char_device()
+    assert list(tmp_path.iterdir()) == [device]
+
+
+@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="no /dev/stdout")
+@pytest.mark.parametrize("name", ["link.txt", "out.txt"])
+def test_standard_output_is_not_cut_off(tmp_path: Path, name: str) -> None:
+    """Neither a pipe nor a file that the shell sends it to, under any name."""
+    code = """
+import sys
+from orient_eye.files import write_text
+print("before", flush=True)
+write_text(sys.argv[1], "table\\n")
+print("after")
+"""
+    out, link = tmp_path / "out.txt", tmp_path / "link.txt"
+    link.symlink_to("/dev/stdout")
+    with out.open("w") as file:
+        run(code, tmp_path / name, stdout=file)
+    assert out.read_text() == "before\ntable\nafter\n"
+    if name == "link.txt":
+        assert run(code, link).stdout == "before\ntable\nafter\n"
+
+
+@posix
+def test_leftovers_of_killed_processes(tmp_path: Path) -> None:
+    """All of them, in folders below too, and nothing else."""
+    code = """
+import os, sys
+from orient_eye.files import write_atomically
+for name in sys.argv[1:]:
+    if os.fork() == 0:
+        write_atomically(name, lambda temporary: os._exit(9))
+    os.wait()
+"""
+    kept = [write_text(tmp_path / name, "kept") for name in (".hidden", ".tmp-orient-eye.txt", "a-0123.tmp-orient-eye")]
+    run(code, "metrics.csv", "stages/000.npz", "no suffix", f"{'ü' * 120}.txt", f"long.{'x' * 200}", cwd=tmp_path)
+    assert len([path for path in tmp_path.rglob("*") if path.is_file()]) == 8
+    removed = remove_leftovers(tmp_path)
+    assert len(removed) == 5
+    assert {path.suffix for path in removed} == {".csv", ".npz", ".tmp-orient-eye", ".txt"}
+    assert sorted(path for path in tmp_path.rglob("*") if path.is_file()) == sorted(kept)
+    assert remove_leftovers(tmp_path) == remove_leftovers(tmp_path / "nowhere") == []
+
+
+def test_table(tmp_path: Path) -> None:
+    path = write_table(tmp_path / "table.csv", [{"a": 1, "b": "x,y"}, {"a": 2.5, "b": None}])
+    assert path.read_bytes().replace(b"\r", b"") == b'a,b\n1,"x,y"\n2.5,\n'
+    with pytest.raises(InputError, match=r"table\.csv: a table needs at least one row"):
+        write_table(path, [])
+    assert path.read_text().startswith("a,b")
+
+
+FILL = """
+import sys
+from pathlib import Path
+import numpy as np
+from matplotlib.figure import Figure
+from orient_eye import figures, files
+from orient_eye.errors import InputError
+from orient_eye.plants.linear import LinearPlant
+from orient_eye.recording import record
+
+folder = Path(sys.argv[1])
+noise = np.random.default_rng(0).random(30_000)
+figure = Figure(figsize=(9, 9))
+figure.subplots().imshow(noise.reshape(150, 200))
+writers = {
+    "out.txt": lambda path: files.write_text(path, str(noise.tolist())),
+    "out.csv": lambda path: files.write_table(path, [{"noise": x} for x in noise]),
+    "out.npz": lambda path: files.write_atomically(path, lambda file: np.savez(file, noise)),
+    "out.png": lambda path: figures.save(figure, path),
+    "out.rrd": lambda path: record(path, LinearPlant().simulate(np.ones((2, 400, 1)))),
+}
+for name in writers:
+    (folder / name).write_text("old")
+if sys.argv[2] == "limit":
+    import resource
+    resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
+for name, write in writers.items():
+    try:
+        write(folder / name)
+        print(name, "was written")
+    except InputError as error:
+        print(error)
+assert sorted(path.name for path in folder.iterdir()) == sorted(writers)
+assert {path.read_text() for path in folder.iterdir()} == {"old"}
+"""
+
+
+@posix
+def test_a_full_disk_leaves_every_old_file(tmp_path: Path) -> None:
+    """A disk of 64 KiB; where none may be mounted, files of 64 KiB at most."""
+    script = tmp_path / "fill.py"
+    script.write_text(FILL, encoding="utf-8")
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["unshare", "--mount", "sh", "-c", 'mount -t tmpfs -o size=64k tmpfs "$0" && exec "$@"', str(folder)]
+    mounts = shutil.which("unshare") is not None and not subprocess.run([*mount, "true"], check=False).returncode
+    command = [sys.executable, str(script), str(folder), "disk" if mounts else "limit"]
+    done = subprocess.run([*mount, *command] if mounts else command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    reason = "No space left on device" if mounts else "File too large"
+    for line, suffix in zip(done.stdout.splitlines(), ("txt", "csv", "npz", "png", "rrd"), strict=True):
+        assert f"out.{suffix}: {reason}; make room there or name another place" in line
 
 
 def test_a_failed_trajectory_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -345,7 +587,7 @@ def test_a_failed_trajectory_write_keeps_the_old_file(tmp_path: Path, monkeypatc
         raise OSError("disk full")
 
     monkeypatch.setattr(np, "savez_compressed", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InputError, match="disk full"):
         trajectory(1).save_npz(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
@@ -414,7 +656,7 @@ def test_a_missing_surrogate_is_refused(tmp_path: Path) -> None:
 
 
 def test_horizontal_orientations_of_the_csv_are_the_yaw(tmp_path: Path) -> None:
-    one = LowPassPlant(Surrogate(1.0, 10.0)).simulate(np.full((1, 3, 1), 25.0))
+    one = LinearPlant(Surrogate(1.0, 10.0)).simulate(np.full((1, 3, 1), 25.0))
     table = np.genfromtxt(one.to_csv(tmp_path / "t.csv"), delimiter=",", names=True)
     np.testing.assert_allclose(table["yaw_deg"], 25, rtol=1e-8)
     np.testing.assert_allclose([table["q_w"][0], table["q_z"][0]], from_yaw(25.0)[[0, 3]], rtol=1e-8)

@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,38 +12,58 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from orient_eye.commands.pulse_step import FIXED_C, PULSES, PulseStep, varying_C
-from orient_eye.movement.measures import BAND, Measures, measure, measure_response
-from orient_eye.movement.trajectory import EyeState, Trajectory
-from orient_eye.plants.lpf import LowPassPlant
+from orient_eye.commands.pulse_step import PulseStep
+from orient_eye.commands.pulses import PULSES, varying_C
+from orient_eye.constants import BAND
+from orient_eye.motor import Motor
+from orient_eye.movement.measures import Measures, measure
+from orient_eye.movement.trajectory import Trajectory
+from orient_eye.plants import PLANTS, Plant, make_plant
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.rotations import FORWARD, angle_between, from_yaw, rotation, to_euler
+from orient_eye.rotations import FORWARD, angle_between, from_yaw, gaze, rotation, to_euler
+from orient_eye.state import State
 from orient_eye.surrogate import Surrogate
 
 Array = NDArray[np.float64]
 K, W0 = 1.4758, 17.5  # thesis 3.3.1
-PLANT = LowPassPlant(Surrogate(K, W0))
+PLANT = make_plant("lpf", surrogate=Surrogate(K, W0))
 SCALARS = ("amplitude_deg", "settling_time_s", "peak_velocity_deg_s", "overshoot", "skewness")
 
 
-def pulse_step(B: Array, step: Array, k0: Array, variant: int = 1, C: Array | float | None = None) -> PulseStep:
+def respond(command: PulseStep) -> Any:
+    """The closed form of the movement."""
+    return PLANT.move(command).response
+
+
+def yaw_of(response: Any, t: Array) -> Array:
+    """Yaw [deg] at times (saccades or 1, time) [s]."""
+    return response.start[:, None] + (response.final - response.start)[:, None] * response.motion(t)[0]
+
+
+def in_time(command: PulseStep, samples: int, plant: Plant = PLANT) -> Trajectory:
+    """The closed form at this many samples."""
+    return plant.move(command, horizon_s=(samples - 1) * plant.step_s).trajectory()
+
+
+def pulse_step(B: Array, step: Array, k0: Array, name: str = "1", C: Array | float | None = None) -> PulseStep:
     """One motor, from -step / 2 to step / 2."""
     B, step, k0 = (np.atleast_1d(np.asarray(x, float))[:, None] for x in (B, step, k0))
     C = C if C is None else np.atleast_1d(np.asarray(C, float))[:, None]
-    return PulseStep(-step / 2, B, step / 2, k0, variant, C)
+    return PulseStep(-step / 2, B, step / 2, k0, name, C)
 
 
-def random_pulse_steps(variant: int, count: int, seed: int = 0, *, varying: bool = True) -> PulseStep:
+def random_pulse_steps(name: str, count: int, seed: int = 0, *, varying: bool = True) -> PulseStep:
     """From the whole range of actions, half of them near the cliff k0 = w0; C fixed, or half of them varying."""
     rng = np.random.default_rng(seed)
     B, step = rng.uniform(18, 80, count), rng.uniform(-60, 60, count)
     k0 = np.where(np.arange(count) % 2, rng.uniform(5, 40, count), W0 + rng.uniform(-1.5, 0.2, count))
-    if variant not in FIXED_C:
-        return pulse_step(B, step, k0)
-    C = np.full(count, FIXED_C[variant])
+    kind = PULSES[name]
+    if kind.onset is None:
+        return pulse_step(B, step, k0, name)
+    C = np.full(count, kind.onset.fixed)
     if varying:
-        C[::4], C[1::4] = (varying_C(variant, step[i::4], B[i::4], k0[i::4]) for i in (0, 1))
-    return pulse_step(B, step, k0, variant, C)
+        C[::4], C[1::4] = (varying_C(kind, step[i::4], B[i::4], k0[i::4]) for i in (0, 1))
+    return pulse_step(B, step, k0, name, C)
 
 
 # --- the closed form ------------------------------------------------------------------------------
@@ -59,12 +80,12 @@ class Dense:
 
     @classmethod
     def of(cls, command: PulseStep, band: float) -> "Dense":
-        response = PLANT.respond(command)
+        response = respond(command)
         t = np.linspace(0, 30 / min(command.B[0, 0], W0), 40_001)
         start, final = response.start[0], response.final[0]
 
         def progress(s: Array | float) -> Array:
-            return (response.yaw(np.atleast_1d(s)[None])[0] - start) / (final - start)
+            return (yaw_of(response, np.atleast_1d(s)[None])[0] - start) / (final - start)
 
         def acceleration(s: float) -> float:
             return float(np.diff(response.rate(np.array([[s - 1e-6, s + 1e-6]]))[0])[0])
@@ -86,7 +107,7 @@ class Dense:
 
 
 def assert_like_dense(command: PulseStep, band: float = BAND) -> None:
-    found = measure_response(PLANT.respond(command), band=band)
+    found = PLANT.move(command).measure(band)
     assert found.settled.all()
     assert not found.failed.any()
     for i in range(len(found.failed)):
@@ -101,14 +122,14 @@ def assert_like_dense(command: PulseStep, band: float = BAND) -> None:
 
 def replace_rows(command: PulseStep, i: int) -> PulseStep:
     rows = slice(i, i + 1)
-    C = None if command.variant == 1 else np.asarray(command.C)[rows]
-    return PulseStep(command.F[rows], command.B[rows], command.D[rows], command.k0[rows], command.variant, C)
+    C = None if command.kind.onset is None else np.asarray(command.C)[rows]
+    return PulseStep(command.F[rows], command.B[rows], command.D[rows], command.k0[rows], command.pulse, C)
 
 
-@pytest.mark.parametrize("variant", PULSES)
+@pytest.mark.parametrize("name", PULSES)
 @pytest.mark.parametrize("band", [BAND, 0.00707, 0.05])
-def test_closed_form_against_dense_sampling(variant: int, band: float) -> None:
-    assert_like_dense(random_pulse_steps(variant, 8, seed=round(1e5 * band)), band)
+def test_closed_form_against_dense_sampling(name: str, band: float) -> None:
+    assert_like_dense(random_pulse_steps(name, 8, seed=round(1e5 * band)), band)
 
 
 @pytest.mark.parametrize("B", [12.0, 17.5, 17.5 + 1e-9, 80.0, 300.0])
@@ -119,7 +140,7 @@ def test_closed_form_at_the_edges(B: float) -> None:
 
 
 def overshoot_of(k0: float, B: float) -> float:
-    return float(measure_response(PLANT.respond(pulse_step(B, 20.0, k0))).overshoot[0])
+    return float(PLANT.move(pulse_step(B, 20.0, k0)).measure().overshoot[0])
 
 
 @pytest.mark.parametrize("B", [18.0, 35.0, 60.0, 80.0])
@@ -130,8 +151,8 @@ def test_settling_jumps_where_the_overshoot_leaves_the_band(B: float, excess: fl
     An overshoot of more than the band, by ever so little, must be seen: else it would pay to hide there.
     """
     k0 = brentq(lambda k: overshoot_of(k, B) - BAND - excess, 8, 17.49, xtol=1e-13)
-    response = PLANT.respond(pulse_step(B, 20.0, k0))
-    settling = measure_response(response).settling_time_s[0]
+    response = respond(pulse_step(B, 20.0, k0))
+    settling = PLANT.move(pulse_step(B, 20.0, k0)).measure().settling_time_s[0]
     t = np.linspace(0, 1, 20_001)
     x = response.motion(t[None])[0][0]
     crest = t[x.argmax()]
@@ -142,16 +163,16 @@ def test_settling_jumps_where_the_overshoot_leaves_the_band(B: float, excess: fl
         assert settling < crest
 
 
-@pytest.mark.parametrize("variant", PULSES)
-def test_settling_is_continuous_in_the_action(variant: int) -> None:
+@pytest.mark.parametrize("name", PULSES)
+def test_settling_is_continuous_in_the_action(name: str) -> None:
     """Along random lines through the actions; only where the overshoot crosses the band may it jump."""
     rng = np.random.default_rng(5)
     share = np.linspace(0, 1, 4001)
     for _ in range(3):
         ends = rng.uniform([18, 5, 5], [80, 40, 40], (2, 3))
         B, step, k0 = (ends[0] + share[:, None] * (ends[1] - ends[0])).T
-        C = None if variant == 1 else varying_C(variant, step, B, k0)
-        found = measure_response(PLANT.respond(pulse_step(B, step, k0, variant, C)))
+        C = None if PULSES[name].onset is None else varying_C(PULSES[name], step, B, k0)
+        found = PLANT.move(pulse_step(B, step, k0, name, C)).measure()
         change = np.abs(np.diff(found.settling_time_s))
         crossing = np.diff((found.overshoot > BAND).astype(int)) != 0
         assert (change[~crossing] < 1e-3).all()
@@ -159,16 +180,14 @@ def test_settling_is_continuous_in_the_action(variant: int) -> None:
 
 
 def test_mirrored_saccades_measure_alike() -> None:
-    command = random_pulse_steps(1, 20)
-    one, other = (
-        measure_response(PLANT.respond(PulseStep(s * command.F, command.B, s * command.D, command.k0))) for s in (1, -1)
-    )
+    command = random_pulse_steps("1", 20)
+    one, other = (PLANT.move(PulseStep(s * command.F, command.B, s * command.D, command.k0)).measure() for s in (1, -1))
     for name in SCALARS:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def test_closed_form_of_no_movement() -> None:
-    found = measure_response(PLANT.respond(pulse_step(np.array([35.0]), np.array([0.0]), np.array([17.5]))))
+    found = PLANT.move(pulse_step(np.array([35.0]), np.array([0.0]), np.array([17.5]))).measure()
     assert found.amplitude_deg == found.settling_time_s == found.peak_velocity_deg_s == found.overshoot == 0
     assert np.isnan(found.skewness).all()
     assert found.settled.all()
@@ -179,17 +198,17 @@ def test_closed_form_of_no_movement() -> None:
 # --- the sampled form -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("variant", PULSES)
-def test_sampled_form_agrees_with_the_closed_form(variant: int) -> None:
+@pytest.mark.parametrize("name", PULSES)
+def test_sampled_form_agrees_with_the_closed_form(name: str) -> None:
     """At 1 ms: what interpolation leaves is of second order in the sampling."""
-    command = random_pulse_steps(variant, 40, seed=3, varying=False)  # a varying C can peak within 1 ms
-    closed = measure_response(PLANT.respond(command))
+    command = random_pulse_steps(name, 40, seed=3, varying=False)  # a varying C can peak within 1 ms
+    closed = PLANT.move(command).measure()
     # Where the overshoot ends within a sample's curvature of the band, the two may see different exits.
     clear = np.abs(closed.overshoot - BAND) > 1e-5
     assert clear.sum() > 35
     for samples, step_s, shrink in ((1201, 0.001, 1.0), (12001, 0.0001, 0.012)):
-        plant = LowPassPlant(Surrogate(K, W0), step_s=step_s)
-        sampled = measure(plant.trajectory(command, samples), from_yaw(K * command.D[:, 0]))
+        plant = make_plant("lpf", surrogate=Surrogate(K, W0), step_s=step_s)
+        sampled = measure(in_time(command, samples, plant), from_yaw(K * command.D[:, 0]))
         assert sampled.settled.all()
         assert not sampled.failed.any()
         np.testing.assert_allclose(sampled.amplitude_deg, closed.amplitude_deg, rtol=1e-12)
@@ -203,10 +222,10 @@ def test_sampled_form_agrees_with_the_closed_form(variant: int) -> None:
 
 
 def test_orientation_at_settling_is_one_band_from_the_end() -> None:
-    command = random_pulse_steps(1, 40, seed=4)
+    command = random_pulse_steps("1", 40, seed=4)
     for found in (
-        measure_response(PLANT.respond(command)),
-        measure(PLANT.trajectory(command, 1201), from_yaw(K * command.D[:, 0])),
+        PLANT.move(command).measure(),
+        measure(in_time(command, 1201), from_yaw(K * command.D[:, 0])),
     ):
         share = angle_between(found.at_settling, found.final) / found.amplitude_deg
         np.testing.assert_allclose(share, BAND, rtol=1e-6)
@@ -226,7 +245,8 @@ def by_yaw(time: Array, yaw: Array, velocity: Array | None = None) -> Trajectory
     """A horizontal trajectory from yaw (saccades, time)."""
     velocity = np.gradient(yaw, time, axis=1) if velocity is None else velocity
     omega = np.stack([np.zeros_like(yaw), np.zeros_like(yaw), velocity], axis=-1)
-    return Trajectory(time, from_yaw(yaw), omega, yaw[..., None], None, np.zeros(len(yaw), bool), ("motor2",))
+    motor, none = yaw[..., None], np.zeros(len(yaw), bool)
+    return Trajectory(time, from_yaw(yaw), omega, motor, motor, None, none, (Motor("motor2"),))
 
 
 def test_overshoot_and_peak_between_samples() -> None:
@@ -246,7 +266,7 @@ def test_overshoot_and_peak_between_samples() -> None:
 def test_not_settled_within_the_horizon() -> None:
     command = pulse_step(np.array([35.0, 35.0]), np.array([20.0, 20.0]), np.array([17.5, 6.0]))
     final = from_yaw(K * command.D[:, 0])
-    long, short = (measure(PLANT.trajectory(command, n), final) for n in (1201, 201))
+    long, short = (measure(in_time(command, n), final) for n in (1201, 201))
     assert long.settled.tolist() == [True, True]
     assert 0.15 < long.settling_time_s[0] < 0.2 < long.settling_time_s[1]
     assert short.settled.tolist() == [True, False]
@@ -275,8 +295,8 @@ def rows_of(found: Measures, rows: list[int]) -> Measures:
 
 
 def test_failed_saccades_are_nan_and_stay_alone() -> None:
-    command = random_pulse_steps(1, 4, seed=6)
-    trajectory, final = PLANT.trajectory(command, 601), from_yaw(K * command.D[:, 0])
+    command = random_pulse_steps("1", 4, seed=6)
+    trajectory, final = in_time(command, 601), from_yaw(K * command.D[:, 0])
     for broken in (np.nan, 0.5):  # numbers that are none, or any numbers of a saccade marked failed
         q, omega, failed = trajectory.orientation.copy(), trajectory.angular_velocity.copy(), trajectory.failed.copy()
         q[2], omega[2], failed[2] = broken, broken, True
@@ -290,8 +310,8 @@ def test_failed_saccades_are_nan_and_stay_alone() -> None:
 
 
 def test_a_final_orientation_that_is_none_fails_alone() -> None:
-    command = random_pulse_steps(1, 3, seed=7)
-    trajectory, final = PLANT.trajectory(command, 601), from_yaw(K * command.D[:, 0])
+    command = random_pulse_steps("1", 3, seed=7)
+    trajectory, final = in_time(command, 601), from_yaw(K * command.D[:, 0])
     final[1] = np.nan
     found = measure(trajectory, final)
     assert found.failed.tolist() == [False, True, False]
@@ -301,15 +321,15 @@ def test_a_final_orientation_that_is_none_fails_alone() -> None:
 def test_closed_form_of_a_command_that_is_none_fails_alone() -> None:
     good = pulse_step(np.array([35.0, 40.0]), np.array([20.0, -9.0]), np.array([17.5, 12.0]))
     bad = pulse_step(np.array([35.0, np.nan, 40.0]), np.array([20.0, 10.0, -9.0]), np.array([17.5, 17.5, 12.0]))
-    found = measure_response(PLANT.respond(bad))
+    found = PLANT.move(bad).measure()
     assert found.failed.tolist() == [False, True, False]
     for name in SCALARS:
         assert np.isnan(getattr(found, name)[1]).all(), name
-    equal(rows_of(found, [0, 2]), measure_response(PLANT.respond(good)))
+    equal(rows_of(found, [0, 2]), PLANT.move(good).measure())
 
 
 def test_without_a_final_orientation_the_last_sample_counts() -> None:
-    trajectory = PLANT.trajectory(random_pulse_steps(1, 3, seed=8), 901)
+    trajectory = in_time(random_pulse_steps("1", 3, seed=8), 901)
     equal(measure(trajectory), measure(trajectory, trajectory.orientation[:, -1]))
 
 
@@ -323,8 +343,8 @@ def oblique() -> tuple[Trajectory, Array]:
     plant = MujocoPlant(threads=1)
     F, D = rng.uniform(-12, 12, (2, 8, 3))
     command = PulseStep(F, rng.uniform(25, 70, (8, 3)), D, rng.uniform(8, 25, (8, 3)))
-    trajectory = plant.simulate(command.sample(plant.step_s, 1801))  # torsion takes long
-    return trajectory, plant.rest_orientation(D)
+    trajectory = plant.move(command.sample(plant.step_s, 1801)).trajectory()  # torsion takes long
+    return trajectory, plant.rest(D)
 
 
 @settings(deadline=None, max_examples=30, derandomize=True)
@@ -369,9 +389,9 @@ def test_amplitude_in_three_dimensions() -> None:
 @pytest.mark.parametrize("axis", [(0.0, 1, 0), (0.6, 0, 0.8), (1 / 3, -2 / 3, 2 / 3)])
 def test_a_turn_about_a_fixed_axis_measures_like_a_horizontal_one(axis: tuple[float, float, float]) -> None:
     """Through an angle that is the closed-form yaw: the axis does not matter."""
-    command = random_pulse_steps(1, 12, seed=9)
-    flat, final = PLANT.trajectory(command, 1201), from_yaw(K * command.D[:, 0])
-    yaw = PLANT.respond(command).yaw(flat.time[None])
+    command = random_pulse_steps("1", 12, seed=9)
+    flat, final = in_time(command, 1201), from_yaw(K * command.D[:, 0])
+    yaw = yaw_of(respond(command), flat.time[None])
 
     def about(angle: Array) -> Array:
         turned = Rotation.from_rotvec(np.deg2rad(angle).reshape(-1, 1) * np.array(axis))
@@ -405,10 +425,76 @@ def test_overshoot_counts_only_along_the_saccade() -> None:
 
 
 def test_mujoco_settles_where_the_equilibrium_is() -> None:
-    """The settled end of a simulated saccade is `rest_orientation`, so that either may be the final one."""
+    """The settled end of a simulated saccade is `rest`, so that either may be the final one."""
     plant = MujocoPlant(threads=1)
-    trajectory = plant.simulate(np.tile([0.0, 14.0, 0.0], (1, 1501, 1)), EyeState(FORWARD[None]))
-    rest = plant.rest_orientation(np.array([[0.0, 14.0, 0.0]]))
+    start = State(FORWARD[None], np.array([[0.0, 14.0, 0.0]]))
+    trajectory = plant.move(np.tile(start.motor[0], (1, 1501, 1)), start).trajectory()
+    rest = plant.rest(start.motor)
     by_end, by_rest = measure(trajectory), measure(trajectory, rest)
     for name in SCALARS:
         np.testing.assert_allclose(getattr(by_end, name), getattr(by_rest, name), rtol=1e-5, atol=1e-6, err_msg=name)
+
+
+# --- gaze -----------------------------------------------------------------------------------------
+
+
+def test_gaze_measures_are_orientation_measures_on_horizontal_saccades() -> None:
+    """Sampled and in closed form."""
+    command = random_pulse_steps("1", 20, seed=11)
+    trajectory, final = in_time(command, 1201), from_yaw(K * command.D[:, 0])
+    for one, other in (
+        (measure(trajectory, final), measure(trajectory, final, of="gaze")),
+        (PLANT.move(command).measure(), PLANT.move(command).measure(of="gaze")),
+    ):
+        for name in SCALARS:
+            np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=1e-9, atol=1e-11, err_msg=name)
+        assert angle_between(one.at_settling, other.at_settling).max() < 1e-9
+        np.testing.assert_array_equal(one.settled, other.settled)
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_every_plant_measures_horizontal_saccades_alike_by_gaze_and_by_orientation(name: str) -> None:
+    """Of those of its motors that turn it horizontally and nothing else, if there are any."""
+    plant = make_plant(name)
+    turned = np.abs(np.stack(to_euler(plant.rest(np.eye(len(plant.motors)))), axis=-1))
+    pure = np.flatnonzero((turned[:, 0] > 1e-3) & (turned[:, 1:].max(axis=1) < 1e-9 * turned[:, 0]))
+    if not pure.size:
+        pytest.skip("no motor turns this eye horizontally alone")
+    F, D = np.zeros((2, 3, len(plant.motors)))
+    F[:, pure[0]], D[:, pure[0]] = [0.0, -6.0, 5.0], [12.0, 9.0, -11.0]
+    movement = plant.move(PulseStep(F, np.full_like(F, 45.0), D, np.full_like(F, 15.0)), horizon_s=1.0)
+    one, other = movement.measure(), movement.measure(of="gaze")
+    for scalar in SCALARS:
+        np.testing.assert_allclose(getattr(other, scalar), getattr(one, scalar), rtol=1e-6, atol=1e-7, err_msg=scalar)
+
+
+@settings(deadline=None, max_examples=15, derandomize=True)
+@given(seed=st.integers(0, 2**30), torsion_deg=st.floats(-30, 30))
+def test_gaze_measures_ignore_torsion(seed: int, torsion_deg: float) -> None:
+    """Another turn about the line of sight at every instant moves the eye, but not the gaze."""
+    trajectory, final = oblique()
+    phase = np.random.default_rng(seed).uniform(0, 6, (len(trajectory), 1))
+    rate = 2 * np.pi * 3
+    angle = np.deg2rad(torsion_deg) * np.sin(rate * trajectory.time + phase)
+    slope = torsion_deg * rate * np.cos(rate * trajectory.time + phase)
+
+    def twisted(q: Array, by: Array) -> Array:
+        about = Rotation.from_rotvec(by.reshape(-1, 1) * [1.0, 0, 0])
+        return np.asarray((rotation(q.reshape(-1, 4)) * about).as_quat(scalar_first=True)).reshape(q.shape)
+
+    omega = trajectory.angular_velocity + slope[..., None] * gaze(trajectory.orientation)
+    other = replace(trajectory, orientation=twisted(trajectory.orientation, angle), angular_velocity=omega)
+    seen = measure(trajectory, final, of="gaze"), measure(other, twisted(final, angle[:, -1]), of="gaze")
+    for name in SCALARS:
+        np.testing.assert_allclose(getattr(seen[1], name), getattr(seen[0], name), rtol=1e-6, atol=1e-8, err_msg=name)
+    np.testing.assert_allclose(gaze(seen[1].at_settling), gaze(seen[0].at_settling), atol=1e-4)
+    if abs(torsion_deg) > 5:
+        assert (measure(other, final).peak_velocity_deg_s > seen[1].peak_velocity_deg_s + 1).any()
+
+
+def test_amplitude_of_gaze_is_the_angle_between_the_lines_of_sight() -> None:
+    trajectory, final = oblique()
+    start, end = (rotation(q).apply([1.0, 0, 0]) for q in (trajectory.orientation[:, 0], final))
+    apart = np.rad2deg(np.arccos((start * end).sum(axis=1)))
+    np.testing.assert_allclose(measure(trajectory, final, of="gaze").amplitude_deg, apart, rtol=1e-9)
+    assert (measure(trajectory, final).amplitude_deg > apart - 1e-9).all()

@@ -5,31 +5,35 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import tyro
 
+from orient_eye.cli.another_plant import AnotherPlant
 from orient_eye.cli.evaluate import Evaluate
 from orient_eye.cli.export import Export
 from orient_eye.cli.models import Models
-from orient_eye.cli.predict import AnotherPlant, Predict
-from orient_eye.commands.motor_file import read_command, rest_position
+from orient_eye.cli.options import parse
+from orient_eye.cli.predict import Predict
+from orient_eye.cli.saccades import Saccades
+from orient_eye.commands.motor_file import read_command
 from orient_eye.errors import InputError
 from orient_eye.learning import figures
 from orient_eye.learning.evaluation import Yardstick
-from orient_eye.learning.policy import Policy
+from orient_eye.learning.policy import NAME, Policy
+from orient_eye.motor import names
 from orient_eye.movement.measures import measure
-from orient_eye.movement.trajectory import EyeState
 from orient_eye.plants import make_plant
 from orient_eye.resources import data_folder
-from orient_eye.rotations import to_euler
+from orient_eye.rotations import from_yaw, to_euler
 from orient_eye.search.optimum import Optimum
+from orient_eye.state import State
 from orient_eye.surrogate import Surrogate
-from orient_eye.task.saccade import SaccadeTask, horizontal
+from orient_eye.task.saccade import SaccadeTask
+from orient_eye.task.targets import saccades
 from test_policy import make_policy
 
+FIVE = Saccades(target=(5.0,))
 PNG = b"\x89PNG"
 
 
@@ -39,7 +43,7 @@ def sensible_policy(task: SaccadeTask) -> Policy:
     weights, biases = [w.copy() for w in policy.weights], [b.copy() for b in policy.biases]
     weights[0][:] = biases[0][:] = 0
     weights[0][[2, 5, 2, 5], [0, 0, 1, 1]] = 1, 1, -1, -1  # relu of target yaw / 35 and of its negative
-    D = float(task.lands_on(horizontal(35.0))[0, 0]) / task.action_high[0, 1]
+    D = float(task.actions.likely(from_yaw([35.0]))[0, 1]) / task.actions.high[1]
     weights[1][:] *= 0.2
     weights[1][:2] = [[-0.9, D, 0.0], [-0.9, -D, 0.0]]
     biases[1][:] = 0.6, 0, -0.25
@@ -64,12 +68,6 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
-def parse(command: Any, *arguments: str) -> Any:
-    """A command from its command line, as `orient-eye` does."""
-    config = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
-    return tyro.cli(command, args=list(arguments), config=config)
-
-
 # --- predict --------------------------------------------------------------------------------------------
 
 
@@ -80,19 +78,20 @@ def test_the_written_command_does_what_was_predicted(
 ) -> None:
     policy = folder if plant == "lpf" else mujoco_folder
     file = tmp_path / "command.csv"
-    result = Predict(str(policy), start=start, target=target, command=file).run()
+    result = Predict(str(policy), Saccades((start,), (target,)), command=file).run()
     (row,) = result["saccades"]
     assert result["plant"] == make_plant(plant).identity()
     # The file read back and simulated, the response measured from its samples.
     eye = make_plant(plant)
-    resting = eye.rest_orientation(rest_position(file, eye))
+    written = read_command(file, eye.motors)
+    resting = eye.rest(written.rest)
     assert to_euler(resting)[0][0] == pytest.approx(start, abs=1e-4)
-    trajectory = eye.simulate(read_command(file, eye), EyeState(resting))
+    trajectory = eye.move(written, State(resting, written.rest)).trajectory()
     final = np.zeros((1, len(eye.motors)))
-    final[0, eye.motors.index("motor2")] = row["D_deg"]
-    measured = measure(trajectory, eye.rest_orientation(final))
+    final[0, names(eye.motors).index("motor2")] = row["D_deg"]
+    measured = measure(trajectory, eye.rest(final))
     assert row["final_yaw_deg"] == pytest.approx(trajectory.yaw_deg[0, -1], abs=0.01)
-    assert row["final_yaw_error_deg"] == pytest.approx(row["final_yaw_deg"] - target, abs=1e-12)
+    assert row["final_yaw_error_deg"] == pytest.approx(row["final_yaw_deg"] - target, abs=2e-9)
     assert row["duration_ms"] == pytest.approx(1e3 * measured.settling_time_s[0], abs=1)
     assert row["peak_velocity_deg_s"] == pytest.approx(measured.peak_velocity_deg_s[0], rel=0.01)
     assert row["overshoot"] == pytest.approx(measured.overshoot[0], abs=1e-3)
@@ -100,34 +99,38 @@ def test_the_written_command_does_what_was_predicted(
     assert row["failed"] is False
 
 
-def test_the_command_file_has_the_columns_of_simulate(folder: Path, tmp_path: Path) -> None:
+def test_the_command_file_has_the_columns_of_simulate(folder: Path, mujoco_folder: Path, tmp_path: Path) -> None:
     file = tmp_path / "new" / "command.csv"
-    (row,) = Predict(str(folder), start=-10.0, target=20.0, command=file).run()["saccades"]
+    (row,) = Predict(str(folder), Saccades((-10.0,), (20.0,)), command=file).run()["saccades"]
     with file.open() as text:
         rows = list(csv.DictReader(text))
-    assert list(rows[0]) == ["t_s", "tau1_deg", "tau2_deg", "tau3_deg"]
+    assert list(rows[0]) == ["t_s", "tau2_deg"]  # the motors of its plant
     assert float(rows[0]["tau2_deg"]) == pytest.approx(row["F_deg"], rel=1e-8)
     assert row["F_deg"] == pytest.approx(-10 / 1.4758)
     assert float(rows[-1]["tau2_deg"]) == pytest.approx(row["D_deg"], abs=0.05)
-    assert {r["tau1_deg"] for r in rows} == {r["tau3_deg"] for r in rows} == {"0"}
     times = np.array([float(r["t_s"]) for r in rows])
     assert times == pytest.approx(0.001 * np.arange(501), abs=1e-12)
+    Predict(str(mujoco_folder), saccades=Saccades(target=(20.0,)), command=file).run()
+    with file.open() as text:
+        rows = list(csv.DictReader(text))
+    assert list(rows[0]) == ["t_s", "tau1_deg", "tau2_deg", "tau3_deg"]
+    assert {r["tau1_deg"] for r in rows} == {r["tau3_deg"] for r in rows} == {"0"}
 
 
 def test_C_is_that_of_the_pulse(folder: Path, mujoco_folder: Path) -> None:
-    (row,) = Predict(str(folder), target=30.0).run()["saccades"]
+    (row,) = Predict(str(folder), saccades=Saccades(target=(30.0,))).run()["saccades"]
     B, k0, size = row["B"], row["k0"], abs(row["D_deg"] - row["F_deg"])
     assert row["C"] == pytest.approx(7200 * k0 / (size * B) - B)  # 4.18
-    (row,) = Predict(str(mujoco_folder), target=30.0).run()["saccades"]
-    assert row["C"] is None
+    (row,) = Predict(str(mujoco_folder), saccades=Saccades(target=(30.0,))).run()["saccades"]
+    assert "C" not in row
 
 
 def test_lists_of_saccades(folder: Path, tmp_path: Path) -> None:
     pairs, out = tmp_path / "pairs.csv", tmp_path / "out.csv"
-    pairs.write_text("note,target_yaw_deg,start_yaw_deg\na,20,0\nb,-35,35\nc,5,5\n")
-    result = Predict(str(folder), pairs=pairs, out=out).run()
+    pairs.write_text("number,target_yaw_deg,start_yaw_deg\n1,20,0\n2,-35,35\n3,5,5\n")
+    result = Predict(str(folder), saccades=Saccades(pairs=pairs), out=out).run()
     assert [(r["start_yaw_deg"], r["target_yaw_deg"]) for r in result["saccades"]] == [(0, 20), (35, -35), (5, 5)]
-    one = Predict(str(folder), start=35.0, target=-35.0).run()["saccades"][0]
+    one = Predict(str(folder), Saccades((35.0,), (-35.0,))).run()["saccades"][0]
     assert result["saccades"][1] == pytest.approx(one)
     with out.open() as text:
         written = list(csv.DictReader(text))
@@ -136,60 +139,87 @@ def test_lists_of_saccades(folder: Path, tmp_path: Path) -> None:
 
 
 def test_predict_reads_its_command_line(folder: Path) -> None:
-    command = parse(Predict, str(folder), "--start", "-5", "--target", "-20.5", "--plant", "mujoco", "--force")
-    assert command == Predict(
-        str(folder), start=-5.0, target=-20.5, another_plant=AnotherPlant(plant="mujoco", force=True)
+    arguments = "--start -5 --target -20.5 --plant mujoco --accurate --force"
+    expected = AnotherPlant("mujoco", {"accurate": True}, force=True)
+    assert parse(Predict, [str(folder), *arguments.split()]) == Predict(
+        str(folder), Saccades((-5.0,), (-20.5,)), another_plant=expected
     )
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("arguments", "words"),
     [
-        ({}, "--target"),
-        ({"start": 3.0}, "--target"),
-        ({"target": 35.001}, "between -35 and 35"),
-        ({"target": -36.0}, "target at -36"),
-        ({"target": 0.0, "start": 40.0}, "start at 40"),
-        ({"target": float("nan")}, "nan"),
-        ({"target": 1.0, "pairs": Path("pairs.csv")}, "not both"),
-        ({"pairs": Path("nothing.csv")}, "cannot read"),
+        ("", "--target"),
+        ("--start 3", "--target"),
+        ("--target 35.001", "between -35.0 and 35.0"),
+        ("--target -36", "target at -36"),
+        ("--target 0 --start 40", "start at 40"),
+        ("--target nan", "nan"),
+        ("--target 1 --pairs pairs.csv", "not both"),
+        ("--target 1 2", "--target takes YAW"),
+        ("--pairs nothing.csv", "cannot read"),
     ],
 )
-def test_saccades_beyond_the_training_are_refused(folder: Path, options: dict[str, Any], words: str) -> None:
+def test_saccades_beyond_the_training_are_refused(folder: Path, arguments: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        Predict(str(folder), **options).run()
+        parse(Predict, [str(folder), *arguments.split()]).run()
+
+
+def test_predict_writes_over_nothing_of_its_own(folder: Path, tmp_path: Path) -> None:
+    pairs, same = tmp_path / "pairs.csv", tmp_path / "new.csv"
+    pairs.write_text("start_yaw_deg,target_yaw_deg\n0,20\n")
+    before = (folder / NAME).read_bytes()
+    for options, words in (
+        ({"saccades": Saccades(pairs=pairs), "out": pairs}, "--out and --pairs"),
+        ({"saccades": Saccades(pairs=pairs), "command": tmp_path / "." / "pairs.csv"}, "--command and --pairs"),
+        ({"saccades": FIVE, "out": same, "command": same}, "--out and --command"),
+        ({"saccades": FIVE, "out": folder / NAME}, "--out and the policy"),
+        ({"saccades": FIVE, "command": folder / NAME}, "--command and the policy"),
+        ({"saccades": FIVE, "out": folder}, "is a folder"),
+    ):
+        with pytest.raises(InputError, match=words):
+            Predict(str(folder), **options).run()
+    assert not same.exists()
+    assert (folder / NAME).read_bytes() == before
 
 
 def test_one_command_file_is_of_one_saccade(folder: Path, tmp_path: Path) -> None:
     pairs = tmp_path / "pairs.csv"
     pairs.write_text("start_yaw_deg,target_yaw_deg\n0,20\n0,10\n")
     with pytest.raises(InputError, match="one saccade"):
-        Predict(str(folder), pairs=pairs, command=tmp_path / "command.csv").run()
+        Predict(str(folder), saccades=Saccades(pairs=pairs), command=tmp_path / "command.csv").run()
     assert not (tmp_path / "command.csv").exists()
 
 
 def test_another_plant_has_to_be_forced(folder: Path, tmp_path: Path) -> None:
-    for another in (AnotherPlant(plant="mujoco"), AnotherPlant(plant="lpf", surrogate=str(tmp_path / "s.json"))):
-        Surrogate(1.5, 16.0).save(tmp_path / "s.json")
-        with pytest.raises(InputError, match="--force"):
-            Predict(str(folder), target=20.0, another_plant=another).run()
-        forced = Predict(str(folder), target=20.0, another_plant=replace(another, force=True)).run()
-        assert len(forced["differs_from_training"]) in (1, 2)
+    surrogate = str(Surrogate(1.5, 16.0).save(tmp_path / "s.json"))
+    for another in (AnotherPlant("mujoco"), AnotherPlant("lpf", {"surrogate": surrogate})):
+        with pytest.raises(InputError, match="force"):
+            Predict(str(folder), saccades=Saccades(target=(20.0,)), another_plant=another).run()
+        forced = Predict(
+            str(folder), saccades=Saccades(target=(20.0,)), another_plant=replace(another, force=True)
+        ).run()
+        assert forced["differs_from_training"][0].startswith(("plant lpf", "K 1.4758, not 1.5"))
         assert forced["plant"]["plant"] == another.plant
-    own = Predict(str(folder), target=20.0).run()
-    same = Predict(str(folder), target=20.0, another_plant=AnotherPlant(plant="lpf")).run()
+    own = Predict(str(folder), saccades=Saccades(target=(20.0,))).run()
+    same = Predict(str(folder), saccades=Saccades(target=(20.0,)), another_plant=AnotherPlant("lpf")).run()
     assert same["differs_from_training"] == []
     assert same["saccades"] == own["saccades"]
-    with pytest.raises(InputError, match="--plant"):
-        Predict(str(folder), target=20.0, another_plant=AnotherPlant(eye="eve_v3")).run()
+    with pytest.raises(InputError, match="--eye says more about a plant; name the plant too, by --plant"):
+        parse(Predict, [str(folder), "--target", "20", "--eye", "eve_v3"])
 
 
-def test_several_driven_motors_have_columns_each(tmp_path: Path) -> None:
-    task = SaccadeTask(make_plant("tavares"), driven=("motor1", "motor2"))
+def test_several_driven_motors_have_columns_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    weights = (1.0, 1.0, 1.0, 1.0)
+    task = SaccadeTask.of_case(make_plant("tavares"), "2-fixed", driven=("motor1", "motor2"), weights=weights)
     make_policy(task).save(tmp_path)
-    (row,) = Predict(str(tmp_path), target=10.0, command=tmp_path / "command.csv").run()["saccades"]
-    assert {"B_motor1", "B_motor2", "D_deg_motor2", "k0_motor1"} <= set(row)
-    assert row["F_deg_motor1"] == pytest.approx(0, abs=1e-6)
+    (row,) = Predict(str(tmp_path), saccades=Saccades(target=(10.0,)), command=tmp_path / "command.csv").run()[
+        "saccades"
+    ]
+    assert {"B_motor1", "B_motor2", "D_motor2_deg", "k0_motor1", "C_motor1"} <= set(row)
+    assert row["F_motor1_deg"] == pytest.approx(0, abs=1e-6)
+    shown = capsys.readouterr().err
+    assert f"{row['B_motor2']:.5g}" in shown
 
 
 # --- evaluate -------------------------------------------------------------------------------------------
@@ -207,7 +237,7 @@ def test_evaluate_holds_a_policy_against_the_optimum(folder: Path, tmp_path: Pat
     assert json.loads((tmp_path / "run" / "run.json").read_text())["config"]["pairs"] == 3
     with (tmp_path / "run" / "pairs.csv").open() as text:
         table = list(csv.DictReader(text))
-    rows = [{key: float(value) for key, value in row.items() if value not in ("True", "False")} for row in table]
+    rows = [{key: float(value) for key, value in row.items() if value not in ("True", "False", "")} for row in table]
     gaps = [(row["reward_best"] - row["reward"]) / abs(row["reward_best"]) for row in rows]
     assert [row["gap"] for row in rows] == pytest.approx(gaps)
     assert result["gap_mean"] == pytest.approx(np.mean(gaps))
@@ -221,22 +251,22 @@ def test_evaluate_holds_a_policy_against_the_optimum(folder: Path, tmp_path: Pat
 def test_evaluate_refuses_before_it_works(folder: Path, tmp_path: Path) -> None:
     for command in (
         Evaluate(str(folder), pairs=0, out=tmp_path / "run"),
-        Evaluate(str(folder), out=tmp_path / "run", another_plant=AnotherPlant(plant="mujoco")),
+        Evaluate(str(folder), out=tmp_path / "run", another_plant=AnotherPlant("mujoco")),
         Evaluate(str(tmp_path / "nothing"), out=tmp_path / "run"),
     ):
         with pytest.raises(InputError):
             command.run()
     assert not (tmp_path / "run").exists()
-    command = parse(Evaluate, str(folder), "--pairs", "7", "--plant", "lpf", "--quiet")
-    assert command == Evaluate(str(folder), pairs=7, another_plant=AnotherPlant(plant="lpf"), quiet=True)
+    command = parse(Evaluate, [str(folder), "--pairs", "7", "--plant", "lpf", "--quiet"])
+    assert command == Evaluate(str(folder), pairs=7, another_plant=AnotherPlant("lpf"), quiet=True)
 
 
 def known(task: SaccadeTask, policy: Policy, yaw: np.ndarray) -> Yardstick:
     """Saccades around straight ahead whose "optimum" is the policy itself, so that nothing is searched."""
-    start, target = task.fixate(horizontal(-yaw / 2)), horizontal(yaw / 2)
+    start, target = saccades(task.targets, -yaw[:, None] / 2, yaw[:, None] / 2)
     action = policy.act(start.orientation, target)
     reward = task.perform(start, action, target).reward.total
-    return Yardstick(task, -yaw / 2, yaw / 2, start, target, Optimum(action, reward, 0))
+    return Yardstick(task, start, target, Optimum(action, reward, 0))
 
 
 @pytest.mark.parametrize(
@@ -252,7 +282,7 @@ def test_figure_5_1_draws_what_the_policy_puts_out(plant: str, case: str, panels
     mean = lines["policy, mean over starting points"]
     start = np.linspace(-35, 35 - 30, 8)
     start, target = np.concatenate([start, start + 30]), np.concatenate([start + 30, start])
-    expected = policy.act(horizontal(start), horizontal(target))[:, 0, 0].mean()
+    expected = policy.act(from_yaw(start), from_yaw(target))[:, 0].mean()
     assert mean.get_ydata()[list(mean.get_xdata()).index(30)] == pytest.approx(expected)
     assert ("policy, symmetric" in lines) == (plant == "mujoco")
 
@@ -264,7 +294,7 @@ def test_the_cost_against_k0_is_the_sum_of_its_terms(folder: Path) -> None:
     figure = figures.figure_5_24(policy, table)
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     k0, cost = (np.array(data) for data in (lines["total"].get_xdata(), lines["total"].get_ydata()))
-    at = table.optimum.action[0, 0, 2]
+    at = table.optimum.action[0, 2]
     assert np.interp(at, k0, cost) == pytest.approx(-table.optimum.reward[0], rel=0.01)
     terms = [lines[name].get_ydata() for name in ("energy", "duration", "overshoot")]  # accuracy: too small to draw
     assert np.nansum(terms, axis=0) == pytest.approx(cost, rel=0.02)
@@ -283,7 +313,7 @@ def test_human_data_has_sources_and_is_drawn(folder: Path) -> None:
 def test_the_pictures_of_training_runs_are_drawn(folder: Path, tmp_path: Path) -> None:
     policy = Policy.load(folder)
     task = policy.task()
-    path = figures.draw_policy(task, policy, known(task, policy, np.array([5.0, 30.0])), tmp_path / "policy.png")
+    path = figures.draw_policy(policy, known(task, policy, np.array([5.0, 30.0])), tmp_path / "policy.png")
     assert path.read_bytes()[:4] == PNG
     metrics = tmp_path / "metrics.csv"
     metrics.write_text("update,reward_mean,gap_mean,gap_p95\n0,nan,2,3\n100,-1e5,0.1,0.2\n")
@@ -298,7 +328,7 @@ def test_models_lists_what_is_shipped() -> None:
     surrogates = {row["name"]: row for row in result["surrogates"]}
     assert surrogates["thesis"]["K"] == 1.4758
     assert {row["name"] for row in result["policies"]} == {
-        file.parent.name for file in data_folder("models").glob("policies/*/policy.json")
+        file.parent.name for file in data_folder("models").glob(f"policies/*/{NAME}")
     }
     assert not any("error" in row for row in (*result["policies"], *result["surrogates"]))
     json.dumps(result, allow_nan=False)
@@ -308,7 +338,7 @@ def test_models_reports_a_damaged_one(folder: Path, tmp_path: Path, monkeypatch:
     shutil.copytree(data_folder("models") / "surrogates", tmp_path / "surrogates")
     for name in ("good", "bad"):
         shutil.copytree(folder, tmp_path / "policies" / name)
-    (tmp_path / "policies" / "bad" / "policy.npz").write_bytes(b"")
+    (tmp_path / "policies" / "bad" / NAME).write_bytes(b"")
     for module in ("orient_eye.learning.policy", "orient_eye.resources"):
         monkeypatch.setattr(f"{module}.data_folder", lambda name: tmp_path)
     bad, good = Models().run()["policies"]
@@ -320,7 +350,11 @@ def test_export_writes_what_is_asked_for(folder: Path, tmp_path: Path) -> None:
     result = Export(str(folder), onnx=tmp_path / "a.onnx", sb3=tmp_path / "a.zip").run()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.onnx", "a.zip"]
     assert result["onnx"] == str(tmp_path / "a.onnx")
-    assert parse(Export, str(folder), "--onnx", "x.onnx") == Export(str(folder), onnx=Path("x.onnx"))
+    assert parse(Export, [str(folder), "--onnx", "x.onnx"]) == Export(str(folder), onnx=Path("x.onnx"))
+    with pytest.raises(InputError, match="--sb3 and --onnx name the same file"):
+        Export(str(folder), onnx=tmp_path / "b", sb3=tmp_path / "b").run()
+    with pytest.raises(InputError, match="--onnx and the policy name the same file"):
+        Export(str(folder), onnx=folder / NAME).run()
     with pytest.raises(InputError, match="say what to write"):
         Export(str(folder)).run()
     (tmp_path / "file").touch()

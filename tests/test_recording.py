@@ -16,7 +16,8 @@ from rerun.chunk import RrdReader
 from orient_eye import rotations
 from orient_eye.cli.view import View
 from orient_eye.errors import InputError
-from orient_eye.eyes import build_model, tendon_tension
+from orient_eye.eyes.model import build_model, tendon_tension
+from orient_eye.motor import Motor
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.recording import curves, record, viewer
@@ -75,23 +76,25 @@ OTHER_EYE = """
 def saccades() -> Trajectory:
     command = np.zeros((3, 150, 3))
     command[:, 10:, 1] = TARGETS_DEG[:, None] / 1.476
-    return MujocoPlant().simulate(command)
+    return MujocoPlant().move(command).trajectory()
 
 
 @pytest.fixture(scope="module")
 def recorded(saccades: Trajectory, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recording") / "three.rrd"
-    return record(path, saccades, target=rotations.from_yaw(TARGETS_DEG), notes="# Three saccades")
+    target = rotations.from_yaw(TARGETS_DEG)
+    return record(path, saccades, model=build_model(), target=target, notes="# Three saccades")
 
 
-def horizontal(motors: tuple[str, ...], saccades: int = 1, samples: int = 40) -> Trajectory:
+def horizontal(motors: tuple[str, ...], saccades: int = 1, samples: int = 40, unit: str = "deg") -> Trajectory:
     """Saccades that turn left with their motors, of a plant without tendons."""
     yaw = np.linspace(0, 12, samples) * np.arange(1, saccades + 1)[:, None]
     velocity = np.zeros((saccades, samples, 3))
     velocity[..., 2] = np.gradient(yaw, 1e-3, axis=1)
     motor = yaw[..., None] / 1.5 + np.arange(len(motors))
     time, failed = 1e-3 * np.arange(samples, dtype=float), np.zeros(saccades, bool)
-    return Trajectory(time, rotations.from_yaw(yaw), velocity, motor, None, failed, motors)
+    described = tuple(Motor(name, unit) for name in motors)
+    return Trajectory(time, rotations.from_yaw(yaw), velocity, motor, motor, None, failed, described)
 
 
 def entities(path: Path) -> set[str]:
@@ -190,7 +193,7 @@ def test_file_is_whole_has_a_layout_and_draws_once_what_stands_still(recorded: P
 
 def test_a_plant_with_one_motor_and_no_tendons(tmp_path: Path) -> None:
     trajectory = horizontal(("motor2",))
-    path = record(tmp_path / "one.rrd", trajectory)
+    path = record(tmp_path / "one.rrd", trajectory, model=build_model())
     verify(path)
     np.testing.assert_array_equal(scalars(path, "/saccades/0_saccade_0/angle/yaw")[1], trajectory.yaw_deg[0])
     np.testing.assert_array_equal(scalars(path, "/saccades/0_saccade_0/motor/motor2")[1], trajectory.motor[0, :, 0])
@@ -202,6 +205,44 @@ def test_a_plant_with_one_motor_and_no_tendons(tmp_path: Path) -> None:
     data.joint("motor2").qpos[:] = np.deg2rad(trajectory.motor[0, -1])
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(tension[-1], tendon_tension(model, data.ten_length), atol=1e-9)
+
+
+@pytest.mark.parametrize("motors", [("motor2",), ("pan", "tilt"), ()])
+def test_an_eye_without_a_model_is_a_ball(motors: tuple[str, ...], tmp_path: Path) -> None:
+    """Whatever moves it, and where nothing is known to: no arm, no tendon, and never the thesis' eye."""
+    trajectory = horizontal(motors, saccades=2, unit="mm")
+    path = record(tmp_path / "ball.rrd", trajectory, reference=trajectory)
+    verify(path)
+    drawn, root = entities(path), "/saccades/1_saccade_1"
+    assert {f"{root}/scene/eye/sclera", f"{root}/scene/eye/gaze", "/head/protractor"} <= drawn
+    assert {each for each in drawn if each.startswith(f"{root}/motor")} == {f"{root}/motor/{name}" for name in motors}
+    assert not any("arm" in each or "tension" in each or "tendon" in each for each in drawn)
+    _, xyzw = column(path, f"{root}/scene/eye", "Transform3D:quaternion")
+    turned = np.roll(np.array(xyzw).squeeze(), 1, axis=-1)
+    assert rotations.angle_between(turned, trajectory.orientation[1]).max() < 1e-4
+    assert "Tendons" not in column(path, "/info", "TextDocument:text")[1][0][0]
+
+
+def test_a_command_is_drawn_where_its_motor_did_not_follow(tmp_path: Path) -> None:
+    trajectory = horizontal(("pan", "tilt"), saccades=2, unit="mm")
+    command = trajectory.motor.copy()
+    command[1, 20:, 1] += 3.0
+    apart = replace(trajectory, command=command)
+    path = record(tmp_path / "told.rrd", apart)
+    verify(path)
+    for k in (0, 1):
+        root = f"/saccades/{k}_saccade_{k}"
+        np.testing.assert_array_equal(scalars(path, f"{root}/command/tilt")[1], command[k, :, 1])
+        np.testing.assert_array_equal(scalars(path, f"{root}/motor/tilt")[1], trajectory.motor[k, :, 1])
+    assert not any("command/pan" in each for each in entities(path))
+    shown = {plot.name: plot for plot in curves.Curves(apart, [0, 1], np.zeros((2, 40, 0)), ()).plots()}
+    plot = shown["pan, tilt [mm], command grey"]
+    assert plot.series == ("motor/pan", "motor/tilt", "command/tilt")
+    assert plot.span == (0.0, command.max())
+    assert not curves.Curves(apart, [0], np.zeros((2, 40, 0)), ()).told  # drawn only where it is seen
+    motors = (Motor("pan", "mm"), Motor("tilt", "deg"))
+    mixed = curves.Curves(replace(apart, motors=motors), [0, 1], np.zeros((2, 40, 0)), ()).plots()
+    assert [each.name for each in mixed][1:3] == ["pan [mm]", "tilt [deg], command grey"]
 
 
 def test_another_preset_draws_itself(tmp_path: Path) -> None:
@@ -243,7 +284,7 @@ def test_an_eye_nobody_thought_of_draws_itself(tmp_path: Path) -> None:
 def test_failed_saccades_are_left_out_with_a_note(tmp_path: Path) -> None:
     command = np.zeros((3, 30, 3))
     command[1, 5:] = np.nan
-    trajectory = MujocoPlant().simulate(command)
+    trajectory = MujocoPlant().move(command).trajectory()
     assert trajectory.failed.tolist() == [False, True, False]
     path = record(tmp_path / "failed.rrd", trajectory, titles=["a", "b", "c"], reference=trajectory)
     verify(path)
@@ -281,11 +322,22 @@ def test_a_failing_write_leaves_the_old_file(
         raise OSError("disk full")
 
     monkeypatch.setattr(curves, "_send", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InputError, match=r"cannot write .*kept\.rrd: disk full"):
         record(path, saccades)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
     assert not rr.strict_mode()
+
+
+def test_a_recording_is_whole(recorded: Path) -> None:
+    """Its footer ends the file, and the layout in it is that of its application."""
+    content = recorded.read_bytes()
+    assert content.startswith(b"RRF2")
+    assert content[-12:-4] == b"RRF2FOOT"
+    reader = RrdReader(recorded)
+    (layout,), (data,) = reader.blueprints(), reader.recordings()
+    assert layout.application_id == data.application_id
+    assert layout.application_id.startswith("orient-eye-")
 
 
 def test_titles_say_where_a_saccade_comes_from_and_goes(tmp_path: Path) -> None:
@@ -309,8 +361,8 @@ def test_bad_input_is_refused(saccades: Trajectory, tmp_path: Path) -> None:
         record(tmp_path / "eye.rrd", saccades, target=TARGETS_DEG)
     with pytest.raises(InputError, match="titles: one for each of the 3"):
         record(tmp_path / "eye.rrd", saccades, titles=["one"])
-    with pytest.raises(InputError, match=r"tilt.*build_model"):
-        record(tmp_path / "eye.rrd", horizontal(("tilt",)))
+    with pytest.raises(InputError, match=r"moves tilt, .* motor1, motor2, motor3.*plant\.drawn"):
+        record(tmp_path / "eye.rrd", horizontal(("tilt",)), model=build_model())
     with pytest.raises(InputError, match="at least one"):
         record(tmp_path / "eye.rrd", saccades[:0])
     assert not list(tmp_path.iterdir())

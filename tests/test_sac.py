@@ -1,5 +1,6 @@
 """OneStepSAC: hand-written gradients against autograd, the replay buffer, and SB3's interface."""
 
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import torch
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from orient_eye.environments.saccade_env import SaccadeVecEnv
+from orient_eye.environments.sb3_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
@@ -253,3 +254,12 @@ class Learned(GazeFeatures):
 def test_refuses_what_it_would_train_wrongly(env: SaccadeVecEnv, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         OneStepSAC("MlpPolicy", env, **{"temperature": falling_temperature(), **settings})
+
+
+def test_the_example_with_a_stock_algorithm_learns(capsys: pytest.CaptureFixture[str]) -> None:
+    example = runpy.run_path(str(Path(__file__).parents[1] / "examples" / "stock_sb3.py"))
+    threads = torch.get_num_threads()
+    before, after = example["main"](steps=400, judged=40)
+    torch.set_num_threads(threads)
+    assert after > before + 0.1
+    assert f"after 400 saccades: {after:.3f}" in capsys.readouterr().out

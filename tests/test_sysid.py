@@ -4,6 +4,7 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,15 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from orient_eye import rotations
 from orient_eye.cli.sysid import Sysid
 from orient_eye.errors import InputError
+from orient_eye.motor import Motor, names
 from orient_eye.plants import PLANTS, make_plant
+from orient_eye.plants.simulated import Run, SimulatedPlant
+from orient_eye.rotations import to_euler
+from orient_eye.state import State
 from orient_eye.surrogate import Surrogate
 from orient_eye.sysid import StepResponse, identify_plant, identify_recordings
 from orient_eye.sysid.comparison import compare, preferred
 from orient_eye.sysid.fit import fit_model
 from orient_eye.sysid.models import MODELS
 from orient_eye.sysid.plant_steps import plant_steps
+from orient_eye.sysid.step_response import AXES, axis_angle
 
 # Step responses of the thesis author's own program (1 ms Euler), each fitted with K A (1 - exp(-w0 t)) by
 # least squares over 0.8 s; the numbers behind thesis Figure 3.5.
@@ -184,10 +191,91 @@ def test_mujoco_surrogate_is_the_thesis_one() -> None:
 
 @pytest.mark.parametrize("name", PLANTS)
 def test_every_plant_can_be_identified(name: str) -> None:
+    """With what moves it and the way it turns: the gain is that between motor and eye at rest."""
+    plant = make_plant(name)
+    found = identify_plant(plant, (5.0, -10.0), held_out=(7.5,))
+    assert found.surrogate.motor in names(plant.motors)
+    assert found.surrogate.axis in AXES
+    motor = np.zeros((3, len(plant.motors)))
+    motor[1:, names(plant.motors).index(found.surrogate.motor)] = 5.0, -10.0
+    angle = axis_angle(plant.rest(motor)[:, None], found.surrogate.axis)[:, 0]
+    static = np.sum((angle[1:] - angle[0]) * [5.0, -10.0]) / (5.0**2 + 10.0**2)
+    assert pytest.approx(static, rel=0.01) == found.surrogate.K
+    assert all(h.r_squared > 0.9 for h in found.held_out_fit)
+    assert found.surrogate.eye == plant.identity().get("eye")
+
+
+@pytest.mark.parametrize(
+    ("name", "gain", "w0"), [("mujoco", 1.4667, 17.567), ("tavares", 1.4667, 17.567), ("lpf", 1.4758, 17.5)]
+)
+def test_horizontal_gain_and_cut_off(name: str, gain: float, w0: float) -> None:
     found = identify_plant(make_plant(name), (5.0, -10.0), held_out=(7.5,))
-    gain = found.surrogate.K
-    assert gain == pytest.approx(1.4667 if name != "lpf" else 1.4758, rel=1e-3)
-    assert found.surrogate.w0 == pytest.approx(17.567 if name != "lpf" else 17.5, rel=1e-3)
+    assert (found.surrogate.motor, found.surrogate.axis) == ("motor2", "yaw")
+    assert (found.surrogate.K, found.surrogate.w0) == pytest.approx((gain, w0), rel=1e-3)
+
+
+@pytest.mark.parametrize("options", [{}, {"gravity": True}, {"eye": "eve_v3"}])
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        ({}, ("motor2", "yaw")),
+        ({"axis": "pitch"}, ("motor1", "pitch")),
+        ({"axis": "roll"}, ("motor1", "roll")),
+        ({"motor": "motor3"}, ("motor3", "pitch")),
+        ({"motor": "motor3", "axis": "roll"}, ("motor3", "roll")),
+    ],
+)
+def test_motor_and_angle_follow_from_the_plant(
+    asked: dict[str, str], found: tuple[str, str], options: dict[str, Any]
+) -> None:
+    done = plant_steps(make_plant("mujoco", **options), (5.0,), **asked)
+    assert (done.motor.name, done.axis) == found
+
+
+def test_an_angle_that_nothing_turns_is_refused() -> None:
+    with pytest.raises(InputError, match="unknown angle 'tilt'"):
+        plant_steps(make_plant("lpf"), (5.0,), axis="tilt")
+    with pytest.raises(InputError, match="no motor of plant 'lpf' turns the eye in pitch"):
+        plant_steps(make_plant("lpf"), (5.0,), axis="pitch")
+
+
+def test_a_plant_that_turns_vertically_only_is_identified() -> None:
+    found = identify_plant(Vertical(), (5.0, 10.0, 40.0), held_out=(20.0,))
+    assert (found.surrogate.motor, found.surrogate.axis) == ("tilt", "pitch")
+    assert (found.surrogate.K, found.surrogate.w0) == pytest.approx((0.8, 12.0), rel=1e-4)
+    assert found.steps[2].motor_deg[[0, 100, -1]] == pytest.approx([0, 20, 40])
+
+
+class Vertical(SimulatedPlant):
+    """A rig that turns up and down, its motor slow: what the motor did drives the models, not what it was told."""
+
+    name = "vertical"
+    motors = (Motor("tilt", "deg", (-90, 90), (-40, 40), speed_limit=200.0),)
+    gain, rate = 0.8, 12.0
+
+    def run(self, motor: np.ndarray, start: State) -> Run:
+        tau, pitch = motor[..., 0], np.empty(motor.shape[:2])
+        pitch[:, 0] = to_euler(start.orientation)[1]
+        for k in range(1, pitch.shape[1]):  # by the trapezoidal rule
+            known = pitch[:, k - 1] * (2 / self.step_s - self.rate)
+            driven = self.rate * self.gain * (tau[:, k] + tau[:, k - 1])
+            pitch[:, k] = (known + driven) / (2 / self.step_s + self.rate)
+        velocity = np.zeros((*pitch.shape, 3))
+        velocity[..., 1] = self.rate * (self.gain * tau - pitch)
+        return self.turned(pitch), velocity, None, np.zeros(len(tau), bool)
+
+    @staticmethod
+    def turned(pitch: np.ndarray) -> np.ndarray:
+        return rotations.from_euler(0 * pitch, pitch, 0 * pitch)
+
+    def rest(self, motor: np.ndarray) -> np.ndarray:
+        return self.turned(self.gain * np.asarray(motor, float)[:, 0])
+
+    def hold(self, orientation: np.ndarray, driven: tuple[str, ...]) -> np.ndarray:
+        return to_euler(orientation)[1][:, None] / self.gain
+
+    def identity(self) -> dict[str, Any]:
+        return {"plant": self.name}
 
 
 def test_lpf_returns_its_own_numbers() -> None:
@@ -208,7 +296,7 @@ def test_lpf_returns_its_own_numbers() -> None:
         ((5.0, float("nan")), "motor2", "nan"),
         ((5.0, 5.0), "motor2", "twice"),
         ((81.0,), "motor2", "outside the mechanical range of motor2, -80 to 80"),
-        ((5.0,), "motor7", "no motor 'motor7'"),
+        ((5.0,), "motor7", "cannot drive .*motor7"),
     ],
 )
 def test_steps_a_plant_cannot_do_are_refused(amplitudes: tuple[float, ...], motor: str, words: str) -> None:
@@ -217,7 +305,9 @@ def test_steps_a_plant_cannot_do_are_refused(amplitudes: tuple[float, ...], moto
 
 
 def test_steps_past_the_bend_are_warned_of() -> None:
-    assert "bends over" in plant_steps(make_plant("mujoco"), (60.0,)).warnings[0]
+    warning = plant_steps(make_plant("mujoco"), (40.0, 60.0)).warnings[0]
+    assert warning.startswith("steps to 60 deg leave the working range of motor2, -40 to 40 deg")
+    assert "bends over" in warning
 
 
 # --- command --------------------------------------------------------------------------------------------
@@ -239,8 +329,8 @@ def test_command_writes_what_train_and_people_need(tmp_path: Path) -> None:
 
 
 def test_a_setting_the_plant_has_not_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="--accurate"):
-        Sysid(plant="lpf", accurate=True, out=tmp_path / "run").run()
+    with pytest.raises(InputError, match=r"accurate.*its options are"):
+        Sysid(plant="lpf", plant_options={"accurate": True}, out=tmp_path / "run").run()
     assert not (tmp_path / "run").exists()
 
 

@@ -11,10 +11,12 @@ from scipy.integrate import solve_ivp
 
 from orient_eye import validation
 from orient_eye.commands.pulse_step import PulseStep
-from orient_eye.movement.trajectory import EyeState
+from orient_eye.movement.trajectory import Trajectory
+from orient_eye.plants import Plant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import STATIC_FRICTION, TavaresPlant
 from orient_eye.rotations import FORWARD, rotation, to_euler
+from orient_eye.state import State
 from orient_eye.validation import Check, against_author, against_reference, against_truth, author_runs
 
 Array = NDArray[np.float64]
@@ -38,6 +40,12 @@ def solved() -> tuple[list[Check], list[Array]]:
 @pytest.fixture
 def truth(solved: tuple[list[Check], list[Array]]) -> list[Check]:
     return solved[0]
+
+
+def ahead(plant: Plant, command: Array) -> Trajectory:
+    """From straight ahead, whatever the motors say there."""
+    start = State(np.tile(FORWARD, (len(command), 1)), command[:, 0])
+    return plant.move(command, start).trajectory()
 
 
 def limits(checks: list[Check], against: str) -> list[float]:
@@ -85,11 +93,11 @@ def test_the_error_shrinks_with_the_step() -> None:
         plant.step_s = step_s
         plant.model.opt.timestep = step_s
         for motor in plant.motors:
-            actuator = plant.model.actuator(motor)
+            actuator = plant.model.actuator(motor.name)
             actuator.gainprm[0], actuator.biasprm[1], actuator.biasprm[2] = 1 / step_s**2, -1 / step_s**2, -1 / step_s
         samples = round(0.3 / step_s) + 1
         command = np.tile([0.0, 20.0, 0.0], (1, samples, 1))
-        yaw = plant.simulate(command, EyeState(FORWARD[None])).yaw_deg[0, :: round(0.001 / step_s)]
+        yaw = ahead(plant, command).yaw_deg[0, :: round(0.001 / step_s)]
         errors.append(np.abs(yaw - exact).max())
     assert errors[0] / errors[1] == pytest.approx(5, rel=0.05)
 
@@ -143,7 +151,7 @@ def test_the_truth_agrees_with_one_degree_of_freedom() -> None:
 def test_the_error_is_an_angle() -> None:
     """On a horizontal run it is the difference in yaw."""
     names, motor, eye = author_runs()
-    found = MujocoPlant().simulate(motor[:1], EyeState(FORWARD[None]))
+    found = ahead(MujocoPlant(), motor[:1])
     by_yaw = np.abs(found.yaw_deg[0] - to_euler(eye[0])[0]).max()
     check = next(c for c in against_author() if c.run == names[0])
     assert check.error_deg == pytest.approx(by_yaw, rel=1e-3)
@@ -164,8 +172,7 @@ def test_the_authors_runs() -> None:
 def test_the_author_stands_still_under_static_friction() -> None:
     """What is left on three-motor runs: his eye does not start before 0.006 N m pull at it."""
     still = np.tile([0.3, 0.0, 0.3], (1, 30, 1))
-    start = EyeState(FORWARD[None])
-    published, viscous = (TavaresPlant(as_published=p).simulate(still, start) for p in (True, False))
+    published, viscous = (ahead(TavaresPlant(as_published=p), still) for p in (True, False))
     torque, _ = TavaresPlant().elastic_torque(rotation(FORWARD[None]).as_matrix(), still[:, 0])
     assert 0 < np.linalg.norm(torque) < STATIC_FRICTION
     np.testing.assert_array_equal(published.orientation, np.tile(FORWARD, (1, 30, 1)))

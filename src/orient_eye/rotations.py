@@ -19,11 +19,21 @@ def rotation(orientation: ArrayLike) -> Rotation:
     return Rotation.from_quat(np.asarray(orientation, dtype=float), scalar_first=True)
 
 
+AXES = {"yaw": 2, "pitch": 1, "roll": 0}
+"""An angle, and the axis it turns about among x, y, z."""
+
+
+def about(axis: str, angle_deg: ArrayLike) -> Array:
+    """Orientations (..., 4) of an eye turned by an angle [deg] (...) about one axis: yaw, pitch or roll."""
+    half = np.deg2rad(np.asarray(angle_deg, dtype=float)) / 2
+    turned = np.zeros((*half.shape, 4))
+    turned[..., 0], turned[..., 1 + AXES[axis]] = np.cos(half), np.sin(half)
+    return turned
+
+
 def from_yaw(yaw_deg: ArrayLike) -> Array:
     """Orientations (..., 4) of an eye turned by yaw [deg] (...) about z."""
-    half = np.deg2rad(np.asarray(yaw_deg, dtype=float)) / 2
-    zero = np.zeros_like(half)
-    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+    return about("yaw", yaw_deg)
 
 
 def from_euler(yaw_deg: ArrayLike, pitch_deg: ArrayLike, roll_deg: ArrayLike) -> Array:
@@ -50,3 +60,15 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     chord = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
     return np.rad2deg(4 * np.arcsin(np.clip(chord / 2, 0, 1)))
+
+
+def gaze(orientation: ArrayLike) -> Array:
+    """Direction of gaze, a unit vector (..., 3) in the head frame, of orientations (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(orientation, dtype=float), -1, 0)
+    return np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=-1)
+
+
+def angle_between_directions(a: ArrayLike, b: ArrayLike) -> Array:
+    """Angle [deg] (...) between unit vectors (..., 3), precise for small angles."""
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    return np.rad2deg(2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)))

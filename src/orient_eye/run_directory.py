@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from orient_eye.errors import InputError
-from orient_eye.files import write_text
+from orient_eye.files import explained, write_text
 
 _PACKAGES = ("orient-eye", "mujoco", "numpy", "scipy", "gymnasium", "stable-baselines3", "torch", "rerun-sdk")
 
@@ -41,12 +41,13 @@ class RunDirectory:
             seed: of all random generators, None where nothing is random.
 
         Raises:
-            InputError: the directory holds something already.
+            InputError: the directory holds something already, or cannot be made.
         """
         path = path or Path("runs") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
-        if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            raise InputError(f"{path} exists and is not an empty folder; name another with --out, or move it away")
-        path.mkdir(parents=True, exist_ok=True)
+        with explained(path):
+            if path.exists() and (not path.is_dir() or any(path.iterdir())):
+                raise InputError(f"{path} exists and is not an empty folder; name another with --out, or move it away")
+            path.mkdir(parents=True, exist_ok=True)
         run = cls(path)
         settings = asdict(config) if is_dataclass(config) and not isinstance(config, type) else config
         run.write_json(

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from orient_eye.commands.pulse_step import PulseStep
-from orient_eye.movement.trajectory import EyeState
+from orient_eye.plants import Plant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import TavaresPlant
 from orient_eye.resources import data_folder
 from orient_eye.rotations import FORWARD, angle_between, rotation
+from orient_eye.state import State
 
 Array = NDArray[np.float64]
 AUTHOR_LIMIT_DEG = 0.02
@@ -74,7 +75,7 @@ def against_author() -> list[Check]:
     limit = np.where(horizontal, HORIZONTAL_LIMIT_DEG, AUTHOR_LIMIT_DEG)
     checks = []
     for against, plant in (("author: MuJoCo", MujocoPlant()), ("author: reference", TavaresPlant(as_published=True))):
-        error = _largest_angle(plant.simulate(motor, _ahead(len(motor))).orientation, eye)
+        error = _largest_angle(_run(plant, motor), eye)
         if against == "author: reference":
             limit = np.full(len(names), HORIZONTAL_LIMIT_DEG)
         checks += [Check(n, against, float(e), float(b)) for n, e, b in zip(names, error, limit, strict=True)]
@@ -89,9 +90,7 @@ def against_reference(count: int, random: np.random.Generator) -> list[Check]:
         B, k0 = random.uniform(30, 70, (count, 3)), random.uniform(12, 21, (count, 3))
         motor = np.concatenate([motor, PulseStep(np.zeros((count, 3)), B, D, k0).sample(0.001, motor.shape[1])])
         names = names + [f"random pulse-steps {i + 1} of all motors" for i in range(count)]
-    start = _ahead(len(motor))
-    ours, theirs = MujocoPlant().simulate(motor, start), TavaresPlant().simulate(motor, start)
-    error = _largest_angle(ours.orientation, theirs.orientation)
+    error = _largest_angle(_run(MujocoPlant(), motor), _run(TavaresPlant(), motor))
     return [Check(n, "reference: MuJoCo", float(e), REFERENCE_LIMIT_DEG) for n, e in zip(names, error, strict=True)]
 
 
@@ -113,7 +112,7 @@ def against_truth() -> list[Check]:
     for name, command, motor2 in cases:
         truth = _solve(TavaresPlant(), motor2, np.linspace(0, 0.6, 601))
         for accurate in (False, True):
-            found = MujocoPlant(accurate=accurate).simulate(command, _ahead(1)).orientation[0]
+            found = _run(MujocoPlant(accurate=accurate), command)[0]
             error, limit = float(angle_between(found, truth).max()), ACCURATE_LIMIT_DEG if accurate else np.inf
             checks.append(Check(name, f"DOP853: MuJoCo {'accurate' if accurate else '1 ms'}", error, limit))
     return checks
@@ -138,8 +137,10 @@ def _solve(plant: TavaresPlant, motor2: Callable[[float], float], times: Array) 
     return unit
 
 
-def _ahead(count: int) -> EyeState:
-    return EyeState(np.tile(FORWARD, (count, 1)))
+def _run(plant: Plant, motor: Array) -> Array:
+    """Orientations (saccades, time, 4) under motor commands (saccades, time, motors), from straight ahead."""
+    start = State(np.tile(FORWARD, (len(motor), 1)), motor[:, 0])
+    return plant.move(motor, start).trajectory().orientation
 
 
 def _largest_angle(a: Array, b: Array) -> Array:

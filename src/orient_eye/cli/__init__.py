@@ -1,135 +1,117 @@
 """The command line: one file a command, each a frozen dataclass that tyro turns into options.
 
 A command's fields are its options, their docstrings the help, and `run()` does the work and returns
-the result as a dictionary of plain values. Words for people go to standard error (`say`); with
-`--json` the result goes to standard output, and nothing else does. Heavy libraries are imported
+the result as a dictionary of plain values. No command imports another. What they share:
+
+    options.py      plants, their options, cases, targets: made from the registries
+    saccades.py     --start, --target and --pairs
+    tables.py       words and tables for people, on standard error
+
+With `--json` the result goes to standard output, and nothing else does. Heavy libraries are imported
 inside `run`, so that `orient-eye --help` answers at once.
 """
 
 import inspect
 import json
-import operator
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any, Protocol, Union, cast
+from typing import Any, Protocol
 
 from orient_eye.errors import InputError
 
-
-class Command(Protocol):
-    """What every command is."""
-
-    def run(self) -> dict[str, Any]:
-        """Do the work; returns the result."""
-        ...
-
-
-def _commands(chosen: Sequence[str]) -> Any:
-    """The union type of all commands, in the order of the help page."""
-    import tyro
-
-    from orient_eye.cli.evaluate import Evaluate
-    from orient_eye.cli.export import Export
-    from orient_eye.cli.models import Models
-    from orient_eye.cli.optimum import OptimumCommand
-    from orient_eye.cli.predict import Predict
-    from orient_eye.cli.simulate import Simulate
-    from orient_eye.cli.sysid import Sysid
-    from orient_eye.cli.train import Train
-    from orient_eye.cli.validate import Validate
-    from orient_eye.cli.view import View
-    from orient_eye.cli.weights import WeightsCommand
-
-    named = {
-        "simulate": Simulate,
-        "view": View,
-        "sysid": Sysid,
-        "train": Train,
-        "models": Models,
-        "predict": Predict,
-        "evaluate": Evaluate,
-        "export": Export,
-        "optimum": OptimumCommand,
-        "weights": WeightsCommand,
-        "validate": Validate,
-    }
-    # Union and Annotated, made by program: a type checker reads neither from variables.
-    members = [
-        operator.getitem(
-            Annotated, (command, tyro.conf.subcommand(name, description=_summary(command, full=name in chosen)))
-        )
-        for name, command in named.items()
-    ]
-    return operator.getitem(Union, tuple(members))
-
-
-def _summary(command: type, *, full: bool) -> str:
-    """The first line of a command's docstring for the list of commands, all of it for its own page."""
-    text = inspect.getdoc(command) or ""
-    return text if full else text.splitlines()[0]
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point of `orient-eye`; exits with 2 on bad input, 130 when interrupted."""
-    try:
-        _run(list(sys.argv[1:] if arguments is None else arguments))
-        sys.stdout.flush()
-    except BrokenPipeError:  # whoever read our output, `head` say, has enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
-
-
-def _run(arguments: list[str]) -> None:
-    import tyro
-    from rich.markup import escape
-
-    from orient_eye.run_directory import plain
-
-    as_json = "--json" in arguments
-    if "--version" in arguments:
-        from orient_eye import __version__
-
-        print(__version__)
-        return
-    command: Command = tyro.cli(
-        cast(type[Any], _commands(arguments)),
-        prog="orient-eye",
-        args=[a for a in arguments if a != "--json"],
-        description=_DESCRIPTION,
-        config=(
-            tyro.conf.OmitSubcommandPrefixes,
-            tyro.conf.OmitArgPrefixes,
-            tyro.conf.FlagCreatePairsOff,
-            tyro.conf.DisallowNone,
-        ),
-    )
-    try:
-        result = command.run()
-    except InputError as error:
-        say(f"[red]error:[/red] {escape(str(error))}")
-        if as_json:
-            print(json.dumps({"error": str(error)}))
-        sys.exit(2)
-    except KeyboardInterrupt:
-        say("interrupted")
-        sys.exit(130)
-    if as_json:
-        print(json.dumps(result, indent=2, default=plain))
-    if result.get("passed") is False:
-        sys.exit(1)
-
+COMMANDS = {
+    "simulate": "orient_eye.cli.simulate:Simulate",
+    "view": "orient_eye.cli.view:View",
+    "sysid": "orient_eye.cli.sysid:Sysid",
+    "train": "orient_eye.cli.train:Train",
+    "models": "orient_eye.cli.models:Models",
+    "predict": "orient_eye.cli.predict:Predict",
+    "evaluate": "orient_eye.cli.evaluate:Evaluate",
+    "export": "orient_eye.cli.export:Export",
+    "optimum": "orient_eye.cli.optimum:Optimum",
+    "weights": "orient_eye.cli.weights:Weights",
+    "validate": "orient_eye.cli.validate:Validate",
+}
+"""Name to "module:class", in the order of the help page."""
 
 _DESCRIPTION = """Simulate, identify and train a biomimetic robot eye.
 
 Every command takes --help, and --json to print its result for programs on standard output."""
 
 
-def say(message: Any = "") -> None:
-    """Print words or a rich table for people, on standard error."""
-    from rich.console import Console
+class Command(Protocol):
+    """What every command is."""
 
-    console = Console(stderr=True, highlight=False)
-    if not console.is_terminal:
-        console.width = 160  # a log file or a pipe: no wrapping at the 80 columns of a missing terminal
-    console.print(message)
+    def run(self) -> dict[str, Any]:
+        """Do the work; returns the result, plain values. `passed` False makes the exit code 1."""
+        ...
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point of `orient-eye`; exits with 2 on bad input, 130 when interrupted."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    as_json = "--json" in given
+    try:
+        code = _run([a for a in given if a != "--json"], as_json=as_json)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read our output, `head` say, has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 1
+    sys.exit(code)
+
+
+def _run(arguments: list[str], *, as_json: bool) -> int:
+    """Run a command line; returns the exit code."""
+    from orient_eye.cli.options import parse
+    from orient_eye.cli.tables import say
+
+    if "--version" in arguments:
+        from orient_eye import __version__
+
+        print(__version__)
+        return 0
+    try:
+        if not arguments or arguments[0] not in COMMANDS:
+            return _list_commands(arguments)
+        result = parse(_command(arguments[0]), arguments[1:], program=f"orient-eye {arguments[0]}").run()
+    except InputError as error:
+        say(f"error: {error}", style="red")
+        if as_json:
+            print(json.dumps({"error": str(error)}))
+        return 2
+    except KeyboardInterrupt:
+        say("interrupted")
+        return 130
+    if as_json:
+        from orient_eye.run_directory import plain
+
+        # JSON has no NaN and no infinity.
+        result = json.loads(json.dumps(result, default=plain), parse_constant=lambda _: None)
+        print(json.dumps(result, indent=2))
+    return 1 if result.get("passed") is False else 0
+
+
+def _command(name: str) -> Any:
+    from orient_eye.registry import load
+
+    return load(COMMANDS[name])
+
+
+def _list_commands(arguments: list[str]) -> int:
+    """The page of all commands, or what is wrong with arguments that begin with none of them; exits."""
+    import operator
+    from dataclasses import make_dataclass
+    from typing import Annotated, Union
+
+    import tyro
+
+    members = []
+    for name in COMMANDS:
+        summary = (inspect.getdoc(_command(name)) or "").splitlines()[0]
+        stands_for = make_dataclass(name, [])
+        # Union and Annotated, made by program: a type checker reads neither from variables.
+        members.append(operator.getitem(Annotated, (stands_for, tyro.conf.subcommand(name, description=summary))))
+    page: Any = operator.getitem(Union, tuple(members))
+    tyro.cli(page, prog="orient-eye", args=arguments, description=_DESCRIPTION)
+    raise InputError(f"name a command first: {', '.join(COMMANDS)}")

@@ -6,44 +6,59 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pathlib import Path
 
+_NUMBERS = {"K": "", "w0": "[rad/s]", "wn": "[rad/s]", "zeta": "", "dead_time": "[s]"}
+
 
 @dataclass(frozen=True)
 class Models:
     """List the policies and surrogates that come with orient-eye.
 
-    Their names are taken by `predict`, `evaluate` and `export`, and by `train --surrogate`.
+    Their names are taken by `predict`, `evaluate` and `export`, and by `--surrogate`.
     """
 
     def run(self) -> dict[str, Any]:
         """Read every manifest and print the tables."""
-        from rich.table import Table
-
-        from orient_eye.cli import say
+        from orient_eye.cli.tables import column, number, say, table
         from orient_eye.learning.policy import shipped_policies
-        from orient_eye.resources import data_folder
+        from orient_eye.surrogate import shipped_surrogates
 
         policies = [_policy(name, folder) for name, folder in shipped_policies().items()]
-        surrogates = [_surrogate(file.stem) for file in sorted(data_folder("models").glob("surrogates/*.json"))]
-        table = Table("policy", "case", "plant", title="policies")
-        for name in ("updates", "mean gap", "95th percentile", "k0 at 30 deg", "best k0"):
-            table.add_column(name, justify="right")
-        for row in policies:
-            table.add_row(*(_text(row, key) for key in ("name", "case", "plant_in_words", "updates")), *_gaps(row))
-        say(table if policies else "no policies are shipped; orient-eye train makes one")
-        table = Table("surrogate", "K", r"w0 \[rad/s]", "motor", "source", title="surrogates")
-        for row in surrogates:
-            table.add_row(*(_text(row, key) for key in ("name", "K", "w0", "motor", "source")))
-        say(table)
+        surrogates = [_surrogate(name) for name in shipped_surrogates()]
+        words = {key: (lambda row, key=key: str(row.get(key) or "")) for key in ("name", "case", "motor", "source")}
+        columns = {
+            "policy": words["name"],
+            "case": words["case"],
+            "plant": lambda row: row.get("plant_in_words", ""),
+            "updates": column("updates", "d"),
+            "mean gap": column("gap_mean", ".2f", " %", 100),
+            "95th percentile": column("gap_p95", ".2f", " %", 100),
+            "k0 at 30 deg": lambda row: number(_at_30(row).get("k0"), ".2f"),
+            "best k0": lambda row: number(_at_30(row).get("k0_best"), ".2f"),
+        }
+        if policies:
+            title = "Policies, and how far their reward is from that of the best actions a search finds."
+            say(table(title, columns, policies, left=("policy", "case", "plant")))
+        else:
+            say("no policies are shipped; orient-eye train makes one")
+        given = [key for key in _NUMBERS if any(row.get(key) for row in surrogates)]
+        columns = {
+            "surrogate": words["name"],
+            **{f"{key} {_NUMBERS[key]}".strip(): column(key, "g") for key in given},
+            "motor": words["motor"],
+            "source": words["source"],
+        }
+        title = "Surrogates: gain and frequency of the linear eye."
+        say(table(title, columns, surrogates, left=("surrogate", "motor", "source")))
         for row in (*policies, *surrogates):
             if "error" in row:
-                say(f"[red]{row['name']} is damaged[/red]: {row['error']}")
+                say(f"{row['name']} is damaged: {row['error']}", "red")
         return {"policies": policies, "surrogates": surrogates}
 
 
 def _policy(name: str, folder: "Path") -> dict[str, Any]:
     from orient_eye.errors import InputError
     from orient_eye.learning.policy import Policy
-    from orient_eye.plants import plant_in_words
+    from orient_eye.words import plant_in_words
 
     try:
         manifest = Policy.load(folder).manifest
@@ -67,16 +82,9 @@ def _surrogate(name: str) -> dict[str, Any]:
         found = Surrogate.load(name)
     except InputError as error:
         return {"name": name, "error": str(error)}
-    return {"name": name, "K": found.K, "w0": found.w0, "motor": found.motor, "source": found.source}
+    return {"name": name, **{key: getattr(found, key) for key in (*_NUMBERS, "motor", "source")}}
 
 
-def _text(row: dict[str, Any], key: str) -> str:
-    value = row.get(key)
-    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _gaps(row: dict[str, Any]) -> list[str]:
-    """Mean gap, its 95th percentile, and k0 of the 30 deg saccade beside the optimum's."""
-    gaps = [row.get("gap_mean"), row.get("gap_p95")]
-    at_30 = [(f"{r['k0']:.2f}", f"{r['k0_best']:.2f}") for r in row.get("table") or [] if r["amplitude_deg"] == 30]
-    return [*("" if gap is None else f"{100 * gap:.2f} %" for gap in gaps), *(at_30[0] if at_30 else ())]
+def _at_30(row: dict[str, Any]) -> dict[str, Any]:
+    """The saccade of 30 deg in the table of a policy's result."""
+    return next((found for found in row.get("table") or [] if found["amplitude_deg"] == 30), {})

@@ -1,22 +1,25 @@
 """`orient-eye sysid`: identify the eye from step responses of a plant or of a rig."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from orient_eye.cli import say
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from orient_eye.plants import Plant
     from orient_eye.sysid import Identification
 
 _AMPLITUDES = tuple(float(a) for a in range(1, 26))
 _HELD_OUT = (1.5, 4.5, 9.5, 14.5, 19.5, 24.5)
+
+
+def _default(words: str, metavar: str | None = None) -> Any:
+    return tyro.conf.arg(help_behavior_hint=f"(default: {words})", metavar=metavar)
 
 
 @dataclass(frozen=True)
@@ -38,105 +41,124 @@ class Sysid:
     $ orient-eye sysid --recording runs/simulate-1/trajectory.csv --motor motor2 --axis yaw
     """
 
-    plant: Literal["mujoco", "lpf", "tavares"] = "mujoco"
+    plant: str = "mujoco"
     """Plant to identify; not used with --recording."""
-    amplitudes: tuple[float, ...] = _AMPLITUDES
+    plant_options: dict[str, Any] = field(default_factory=dict)
+    amplitudes: Annotated[tuple[float, ...] | None, _default("1 2 3 ... 25", "AMPLITUDE ...")] = None
     """Steps to fit, deg of motor."""
-    held_out: tuple[float, ...] = _HELD_OUT
+    held_out: Annotated[tuple[float, ...] | None, _default("1.5 4.5 9.5 14.5 19.5 24.5", "AMPLITUDE ...")] = None
     """Steps to predict, not to fit, deg of motor. Recordings are left out one at a time instead."""
-    accurate: bool = False
-    """Integrate plant mujoco at 0.2 ms instead of the thesis' 1 ms."""
-    recording: tuple[Path, ...] = ()
+    recording: Annotated[
+        tuple[Path, ...] | None, tyro.conf.arg(metavar="FILE ...", help_behavior_hint="(optional)")
+    ] = None
     """Measured step responses, instead of a plant: CSV files or logs of the prototype."""
-    motor: str | None = None
-    """Motor that steps. Default: motor2; of a CSV file the column motor_deg, else tau2_deg."""
-    axis: Literal["yaw", "pitch", "roll"] | None = None
-    """Angle of the eye. Default: yaw; of a CSV file eye_deg, of a prototype log the rotation of its movement."""
+    motor: Annotated[str | None, _default("one that turns the eye; of a CSV file motor_deg, else tau2_deg")] = None
+    """Motor that steps; of a CSV file the motor whose column it is."""
+    axis: Annotated[
+        Literal["yaw", "pitch", "roll"] | None,
+        _default("what the motor turns; of a CSV file eye_deg, of a prototype log the rotation of its movement"),
+    ] = None
+    """Angle of the eye that is watched."""
     row_times: Literal["even", "row-by-row", "nominal"] = "even"
     """Time of a prototype log, which has none: one interval from its motors, each row by itself, or 10 ms."""
-    until: float | None = None
+    until: Annotated[float | None, _default("the whole recording")] = None
     """Leave out of recordings what comes after this time, s: a sensor that creeps long after the step."""
-    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: runs/sysid-DATE-TIME)")] = None
+    out: Annotated[Path | None, _default("runs/sysid-DATE-TIME")] = None
     """Run directory, new or empty."""
 
     def run(self) -> dict[str, Any]:
         """Identify, write the run directory, and return the numbers."""
         from orient_eye.run_directory import RunDirectory
-        from orient_eye.sysid import identify_plant, identify_recordings, read_recordings
         from orient_eye.sysid.report import write_report
 
-        if self.recording:
-            default = Sysid()
-            for name in ("plant", "amplitudes", "held_out", "accurate"):
-                if getattr(self, name) != getattr(default, name):
-                    raise InputError(f"--{name.replace('_', '-')} is for a plant; leave it out beside --recording")
-            steps = read_recordings(self.recording, self.motor, self.axis, self.row_times, self.until)
-            found = identify_recordings(steps)
-        else:
-            plant = self._plant()
-            motor, axis = self.motor or "motor2", self.axis or "yaw"
-            found = identify_plant(plant, self.amplitudes, self.held_out, motor, axis)
+        found = self._plant() if self.recording is None else self._recordings(self.recording)
         run = RunDirectory.create(self.out, "sysid", self)
         result = {**write_report(found, run.path), "out": str(run.path)}
-        self._tell(found, result)
+        _tell(found, result)
         return result
 
-    def _plant(self) -> "Plant":
+    def _recordings(self, paths: tuple[Path, ...]) -> "Identification":
+        from orient_eye.sysid import identify_recordings, read_recordings
+
+        if not paths:
+            raise InputError("--recording names no file; name one or more, or leave it out to identify a plant")
+        given = ["plant"] if self.plant != Sysid.plant else [*self.plant_options]
+        given += [name for name in ("amplitudes", "held_out") if getattr(self, name) is not None]
+        for name in given:
+            raise InputError(f"--{name.replace('_', '-')} is for a plant; leave it out beside --recording")
+        return identify_recordings(read_recordings(paths, self.motor, self.axis, self.row_times, self.until))
+
+    def _plant(self) -> "Identification":
         from orient_eye.plants import make_plant
+        from orient_eye.sysid import identify_plant
 
-        if self.accurate and self.plant != "mujoco":
-            raise InputError(f"--accurate is a setting of plant mujoco, not of {self.plant}; leave it out")
-        return make_plant(self.plant, **({"accurate": True} if self.accurate else {}))
+        if self.until is not None:
+            raise InputError("--until is for recordings; leave it out, or give --recording")
+        plant = make_plant(self.plant, **self.plant_options)
+        amplitudes = _AMPLITUDES if self.amplitudes is None else self.amplitudes
+        held_out = _HELD_OUT if self.held_out is None else self.held_out
+        return identify_plant(plant, amplitudes, held_out, self.motor, self.axis)
 
-    def _tell(self, found: "Identification", result: dict[str, Any]) -> None:
-        say(_steps_table(found))
-        say(_models_table(found))
-        if found.held_out_fit:
-            what = "surrogate on steps not fitted" if found.held_out else "first order, predicted from the others"
-            say(f"{what} (rms in deg, R²):")
-            say(_escaped(", ".join(f"{h.name}: {h.rms_deg:.3f}, {h.r_squared:.5f}" for h in found.held_out_fit)))
-        for warning in found.warnings:
-            say(f"[yellow]note:[/yellow] {_escaped(warning)}")
-        number = found.surrogate
-        say(
-            f"surrogate: K = {number.K:.4f} ± {found.K_half_width:.2g}, w0 = {number.w0:.3f} ± "
-            f"{found.w0_half_width:.2g} rad/s (95 %), in {_escaped(result['out'])}/surrogate.json"
-        )
+
+def _tell(found: "Identification", result: dict[str, Any]) -> None:
+    from orient_eye.cli.tables import say
+
+    say(_steps_table(found))
+    say(_models_table(found))
+    if found.held_out_fit:
+        what = "surrogate on steps not fitted" if found.held_out else "first order, predicted from the others"
+        say(f"{what} (rms in deg, R²):")
+        say(", ".join(f"{h.name}: {h.rms_deg:.3f}, {h.r_squared:.5f}" for h in found.held_out_fit))
+    for warning in found.warnings:
+        say(f"note: {warning}", "yellow")
+    number = found.surrogate
+    say(
+        f"surrogate: K = {number.K:.4f} ± {found.K_half_width:.2g}, w0 = {number.w0:.3f} ± "
+        f"{found.w0_half_width:.2g} rad/s (95 %), in {result['out']}/surrogate.json"
+    )
 
 
 def _steps_table(found: "Identification") -> "Table":
-    from rich.table import Table
+    from orient_eye.cli.tables import table
 
-    table = Table(title="First order, each step by itself (± 95 %)")
-    for name in ("step", "motor", "K", r"w0 \[rad/s]", r"rms \[deg]", "R²"):
-        table.add_column(name, justify="left" if name == "step" else "right", no_wrap=name != "step")
-    for step, (fit, *_) in zip(found.steps, found.fits, strict=True):
-        numbers = (f"{step.amplitude_deg:.4g}", str(fit["K"]), str(fit["w0"]), f"{fit.rms_deg:.3f}")
-        table.add_row(_escaped(step.name.removesuffix(" deg")), *numbers, f"{fit.r_squared:.4f}")
-    return table
+    rows = [{"step": step, "fit": fit} for step, (fit, *_) in zip(found.steps, found.fits, strict=True)]
+    columns = {
+        "step": lambda row: row["step"].name.removesuffix(" deg"),
+        "motor": lambda row: f"{row['step'].amplitude_deg:.4g}",
+        "K": lambda row: str(row["fit"]["K"]),
+        "w0 [rad/s]": lambda row: str(row["fit"]["w0"]),
+        "rms [deg]": lambda row: f"{row['fit'].rms_deg:.3f}",
+        "R²": lambda row: f"{row['fit'].r_squared:.4f}",
+    }
+    return table("First-order model, each step fitted by itself (± 95 %).", columns, rows, left=("step",))
 
 
 def _models_table(found: "Identification") -> "Table":
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(title="All steps together, model by model", show_lines=True)
-    for name in ("model", "parameters (± 95 %)", "rms\n\\[deg]", "AICc", "held out\nrms \\[deg]"):
-        table.add_column(name, justify="left" if name.startswith(("model", "par")) else "right")
-    least = min(row.aicc for row in found.compared)
-    best = found.preferred
-    for row in found.compared:
-        parameters = "\n".join(
+    from orient_eye.cli.tables import Cell, Row, table
+
+    least, best = min(row.aicc for row in found.compared), found.preferred
+
+    def name(row: Any) -> Text:
+        title = row["of"].fit.model.title
+        return Text.assemble((title, "bold"), "\npreferred") if row["of"] is best else Text(title)
+
+    def parameters(row: Any) -> str:
+        return "\n".join(
             f"{e.parameter.name} = {e} {e.parameter.unit.removeprefix('deg/deg')}".rstrip()
             + (" (at its bound)" if e.at_bound else "")
-            for e in row.fit.estimates
+            for e in row["of"].fit.estimates
         )
-        held_out = f"{row.held_out_rms_deg:.3f}" if row.held_out else "-"
-        title = f"[bold]{row.fit.model.title}[/bold]\npreferred" if row is best else row.fit.model.title
-        table.add_row(title, parameters, f"{row.fit.rms_deg:.3f}", f"+{row.aicc - least:.1f}", held_out)
-    return table
 
-
-def _escaped(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)
+    columns: dict[str, Callable[[Row], Cell]] = {
+        "model": name,
+        "parameters (± 95 %)": parameters,
+        "rms\n[deg]": lambda row: f"{row['of'].fit.rms_deg:.3f}",
+        "AICc": lambda row: f"+{row['of'].aicc - least:.1f}",
+        "held out\nrms [deg]": lambda row: f"{row['of'].held_out_rms_deg:.3f}" if row["of"].held_out else "-",
+    }
+    title = "Models compared, each fitted to all steps together (AICc: above the least)."
+    made = table(title, columns, [{"of": row} for row in found.compared], left=("model", "parameters (± 95 %)"))
+    made.show_lines = True
+    return made

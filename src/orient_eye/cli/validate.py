@@ -12,26 +12,29 @@ class Validate:
     """
 
     random_runs: int = 20
-    """Random pulse-steps of all three motors, beside the author's 12 runs."""
+    """Number of random pulse-steps of all three motors, beside the author's 12 runs."""
     seed: int = 0
-    """Of the random runs."""
+    """Seed of the random runs."""
 
     def run(self) -> dict[str, Any]:
         """Validate."""
-        from rich.table import Table
+        from rich.text import Text
 
-        from orient_eye.cli import say
+        from orient_eye.cli.tables import column, say, table
         from orient_eye.errors import InputError
         from orient_eye.validation import passed, validate
 
         if self.random_runs < 0 or self.seed < 0:
             raise InputError(f"--random-runs and --seed must not be negative, got {self.random_runs} and {self.seed}")
         checks = validate(random_runs=self.random_runs, seed=self.seed)
-        table = Table("run", "against", "largest error", "limit", "")
-        for check in checks:
-            short = check.run if len(check.run) < 50 else check.run[:47] + "..."
-            limit = f"{check.limit_deg:g} deg" if check.limit_deg < 1e9 else "none"
-            verdict = "ok" if check.passed else "[red]FAILED[/red]"
-            table.add_row(short, check.against, f"{check.error_deg:.2e} deg", limit, verdict)
-        say(table)
-        return {"passed": passed(checks), "checks": [{**asdict(c), "passed": c.passed} for c in checks]}
+        rows = [{**asdict(check), "passed": check.passed} for check in checks]
+        columns = {
+            "run": lambda row: row["run"] if len(row["run"]) < 50 else f"{row['run'][:47]}...",
+            "against": lambda row: row["against"],
+            "largest error": column("error_deg", ".2e", " deg"),
+            "limit": lambda row: f"{row['limit_deg']:g} deg" if row["limit_deg"] < 1e9 else "none",
+            "verdict": lambda row: "ok" if row["passed"] else Text("FAILED", "red"),
+        }
+        title = "Largest angle between two orientations over each run."
+        say(table(title, columns, rows, left=("run", "against", "verdict")))
+        return {"passed": passed(checks), "checks": rows}

@@ -1,13 +1,11 @@
 """`orient-eye view`: show a recording."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 
-from orient_eye.cli import say
 from orient_eye.errors import InputError
 
 
@@ -18,53 +16,61 @@ class View:
     The first tab compares all saccades, then each has its own; space plays and pauses, at a tenth of the
     speed. Without a screen: --web serves it to a browser on this machine, --screenshot saves a picture.
 
-    Examples:
-        orient-eye view runs/first/trajectory.rrd
-        orient-eye view runs/first/trajectory.rrd --screenshot eye.png --at 0.05
+    $ orient-eye view runs/first/trajectory.rrd
+
+    $ orient-eye view runs/first/trajectory.rrd --screenshot eye.png --at 0.05
     """
 
     file: Annotated[Path, tyro.conf.Positional]
-    """Recording, NAME.rrd."""
+    """The recording, NAME.rrd."""
     web: bool = False
     """Serve it to a browser on this machine, until interrupted."""
-    screenshot: Path | None = None
+    screenshot: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(optional)")] = None
     """Save a picture (PNG) instead of opening a window."""
-    at: float | None = None
-    """Instant of the picture, s; the end by default."""
-    tab: tuple[str, ...] = ()
-    """Tab of the picture: its name, or a group's and then the saccade's; the first by default."""
+    at: Annotated[float | None, tyro.conf.arg(help_behavior_hint="(default: the end)")] = None
+    """Instant of the picture, s."""
+    tab: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...", help_behavior_hint="(default: the first)")] = ()
+    """Tab of the picture: its name, or a group's and then the saccade's."""
     size: tuple[int, int] = (1600, 900)
     """Width and height of the picture, pixels."""
 
     def run(self) -> dict[str, Any]:
         """Show the recording; returns when it is closed."""
         self._check()
+        from orient_eye.cli.tables import say
         from orient_eye.recording import viewer
 
         result: dict[str, Any] = {"file": str(self.file)}
         if self.screenshot is not None:
             missing = viewer.screenshot(self.file, self.screenshot, at_s=self.at, tab=self.tab, size=self.size)
             for report in missing:
-                print(f"not shown: {report}", file=sys.stderr)
-            say(f"wrote {self.screenshot}")
+                say(f"not shown: {report}", "yellow")
+            say(f"in {self.screenshot}")
             result |= {"screenshot": str(self.screenshot), "not_shown": missing}
         elif self.web:
             say("Open this address in a browser on this machine; Ctrl+C ends it.")
-            result["address"] = viewer.serve(self.file, lambda address: print(address, file=sys.stderr, flush=True))
+            result["address"] = viewer.serve(self.file, say)
         else:
             viewer.open_window(self.file)
         return result
 
     def _check(self) -> None:
+        from orient_eye.cli.places import check_outputs
+
         if self.file.is_dir():
             raise InputError(f"{self.file} is a folder; name the recording in it, NAME.rrd")
-        if not self.file.is_file():
-            raise InputError(f"{self.file} does not exist; `orient-eye simulate` writes recordings, NAME.rrd")
-        with self.file.open("rb") as file:
-            recording = file.read(3) == b"RRF"
+        try:
+            with self.file.open("rb") as file:
+                recording = file.read(3) == b"RRF"
+        except (OSError, ValueError) as error:
+            words = getattr(error, "strerror", None) or error
+            raise InputError(f"cannot read {self.file}: {words}; orient-eye simulate writes recordings") from error
         if not recording:
-            raise InputError(f"{self.file} is not a recording: give a file NAME.rrd, as `orient-eye simulate` writes")
+            raise InputError(f"{self.file} is not a recording: give a file NAME.rrd, as orient-eye simulate writes")
         if self.screenshot is not None and self.screenshot.suffix != ".png":
             raise InputError(f"a picture is a file NAME.png, got {self.screenshot.name!r}")
         if self.web and self.screenshot is not None:
             raise InputError("--web and --screenshot exclude each other: give one")
+        if min(self.size) < 1:
+            raise InputError(f"--size is the width and height in pixels, got {self.size[0]} {self.size[1]}")
+        check_outputs({"--screenshot": self.screenshot}, {"the recording": self.file})

@@ -1,109 +1,146 @@
 """orient-eye weights."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-if TYPE_CHECKING:
-    from orient_eye.plants import Plant
-    from orient_eye.task.weights import ChosenSaccade, Steps
+from orient_eye.cli.problem import Problem
 
-_ON_THE_PLANT = tyro.conf.arg(help_behavior_hint="(default: found on the plant)")
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from orient_eye.cli.tables import Row
+    from orient_eye.plants import Plant
+    from orient_eye.task.cases import Case
+    from orient_eye.task.solved_weights import ChosenSaccade, Steps
+    from orient_eye.task.targets import Targets
+
+
+def _found(words: str, metavar: str | None = None) -> Any:
+    return tyro.conf.arg(help_behavior_hint=f"(default: {words})", metavar=metavar)
 
 
 @dataclass(frozen=True)
-class WeightsCommand:
+class Weights:
     """Solve the weights of the reward for which a chosen saccade is optimal (thesis 4.4.5).
 
     With lambda_e = 1 the other three make the gradient of the reward over B, D and k0 vanish at the chosen
-    command. What they depend on: docs/weights.md.
+    command. Where that has no solution, the weights that such a plant comes with are shown, and by what rule.
+    What they depend on: docs/weights.md.
 
     $ orient-eye weights --band 0.00707
 
     $ orient-eye weights --plant mujoco --case 1
     """
 
-    plant: Literal["lpf", "mujoco", "tavares"] = "lpf"
-    """The low-pass surrogate, the MuJoCo eye, or the NumPy reference."""
-    case: Literal["all", "1", "2-fixed", "2-varying", "3-fixed", "3-varying"] = "all"
-    """Pulse of the motor command and its onset rate C: one of the thesis' five cases, or all of them."""
-    surrogate: str = "thesis"
-    """For lpf: a surrogate.json written by sysid, or the name of a shipped one."""
-    eye: str = "thesis"
-    """For mujoco and tavares: preset of the eye."""
-    band: float = 0.01
-    """Settling band, share of the amplitude; 0.00707 comes to the thesis' printed weights."""
-    speed_limit: float = 7200.0
-    """Motor speed to which a varying C brings the command, deg/s."""
-    start: float = 0.0
-    """Yaw at which the chosen saccade begins, deg."""
-    target: float = 30.0
-    """Yaw at which it should end, deg."""
-    B: float = 35.0
-    """Its B, 1/s."""
-    D: Annotated[float | None, _ON_THE_PLANT] = None
-    """Its final motor position, deg: where the eye rests on the target (20.33, the thesis' number, on its plant)."""
-    k0: Annotated[float | None, _ON_THE_PLANT] = None
-    """Its k0, 1/s: below it this saccade overshoots (17.5 on the thesis' plant)."""
+    problem: Problem = field(default_factory=Problem)
+    case: str = "all"
+    """Learning case: the pulse of the motor command, and how its onset rate C is chosen; or all of them."""
+    start: Annotated[tuple[float, ...] | None, _found("straight ahead", "ANGLE ...")] = None
+    """Direction in which the chosen saccade begins, deg: one number for horizontal targets."""
+    target: Annotated[tuple[float, ...] | None, _found("30, or as far as the targets go", "ANGLE ...")] = None
+    """Direction in which it should end, deg."""
+    B: Annotated[float | None, _found("35")] = None
+    """B of the chosen saccade, 1/s."""
+    D: Annotated[tuple[float, ...] | None, _found("found on the plant", "POSITION ...")] = None
+    """Final position of each driven motor, deg: where the eye rests on the target (20.33, the thesis' number, on its
+    plant)."""
+    k0: Annotated[float | None, _found("found on the plant")] = None
+    """k0 of the chosen saccade, 1/s: below it this saccade overshoots (17.5 on the thesis' plant)."""
     step_B: float = 0.2
     """Half-width of the central difference in B, 1/s."""
     step_D: float = 0.02
-    """In D, deg."""
+    """Half-width of the central difference in D, deg."""
     step_k0: float = 0.05
-    """In k0, 1/s; lambda_o is about inversely proportional to it."""
+    """Half-width of the central difference in k0, 1/s; lambda_o is about inversely proportional to it."""
 
     def run(self) -> dict[str, Any]:
         """Solve and print the table."""
-        from rich.table import Table
+        from dataclasses import asdict
 
-        from orient_eye.cli import say
-        from orient_eye.plants import chosen_plant
-        from orient_eye.task.cases import CASES
-        from orient_eye.task.weights import ChosenSaccade, Steps
+        from orient_eye.cli.tables import column, say, table
+        from orient_eye.task.judge import JUDGES
+        from orient_eye.task.solved_weights import Steps
 
-        chosen = ChosenSaccade(self.start, self.target, self.B, self.D, self.k0)
+        plant, targets = self.problem.made()
+        terms = [name for name in JUDGES[targets.of].names if name != "energy"]
         steps = Steps(self.step_B, self.step_D, self.step_k0)
-        plant = chosen_plant(self.plant, self.surrogate, self.eye)
-        names = list(CASES) if self.case == "all" else [self.case]
-        rows = [self._solve(plant, name, chosen, steps) for name in names]
-        saccade = f"{self.start:g} to {self.target:g} deg with B = {self.B:g} 1/s"
-        table = Table("case", title=f"{saccade}, plant {plant.name}, band {self.band:g}; lambda_e = 1")
-        for name in ("lambda_a", "lambda_d", "lambda_o", r"D \[deg]", "k0 [1/s]"):
-            table.add_column(name, justify="right")
-        for row in rows:
-            weights = (f"{row[name]:.2e}".replace("e+0", "e") for name in ("accuracy", "duration", "overshoot"))
-            table.add_row(row["case"], *weights, f"{row['D']:.3f}", f"{row['k0']:.3f}")
-        say(table)
+        rows = [self._solve(plant, targets, name, case, steps) for name, case in self._cases().items()]
+        solved = [key for key in rows[0] if key.split("_")[0] in ("D", "k0")]
+        columns = {
+            "case": lambda row: row["case"],
+            **{f"lambda_{name[0]} ({name})": _weight(name) for name in terms},
+            **{key: column(key) for key in solved},
+            "how": lambda row: row["how"],
+        }
+        title = f"Weights of the reward on plant {plant.name}, band {self.problem.band:g}; lambda_e (energy) is 1."
+        say(table(title, columns, rows, left=("case", "how")))
         return {
             "plant": plant.identity(),
-            "band": self.band,
-            "start_yaw_deg": self.start,
-            "target_yaw_deg": self.target,
-            "steps": {"B": self.step_B, "D": self.step_D, "k0": self.step_k0},
+            "targets": targets.identity(),
+            "band": self.problem.band,
+            "steps": asdict(steps),
             "cases": rows,
         }
 
-    def _solve(self, plant: "Plant", case: str, chosen: "ChosenSaccade", steps: "Steps") -> dict[str, Any]:
-        """One row: the case, its weights, and the resolved saccade."""
-        from dataclasses import asdict
+    def _cases(self) -> "dict[str, str | Case]":
+        """The cases that were asked for, by what to call them."""
+        from orient_eye.cli.tables import say
+        from orient_eye.errors import InputError
+        from orient_eye.task.cases import CASES
+
+        if self.problem.pulse is not None or self.problem.C is not None:
+            return {f"pulse {self.problem.pulse}": self.problem.case(None if self.case == "all" else self.case)}
+        if self.case != "all":
+            return {self.case: self.case}
+        cases: dict[str, str | Case] = {}
+        for name in CASES:
+            try:
+                cases[name] = CASES[name]
+            except InputError as error:  # another package's
+                say(f"note: case {name!r} is left out: {error}", "yellow")
+        return cases
+
+    def _solve(
+        self, plant: "Plant", targets: "Targets", name: str, case: "str | Case", steps: "Steps"
+    ) -> dict[str, Any]:
+        """One row: the case, its weights, the saccade they are solved at, and how."""
+        import numpy as np
 
         from orient_eye.errors import InputError
-        from orient_eye.task.saccade import SaccadeTask
-        from orient_eye.task.weights import resolve, solve_weights
+        from orient_eye.task.judge import JUDGES
+        from orient_eye.task.known_weights import solve
+        from orient_eye.task.solved_weights import Steps, resolve, solve_at
 
-        task = SaccadeTask.of_case(plant, case, band=self.band, speed_limit=self.speed_limit)
+        dummy = dict.fromkeys(JUDGES[targets.of].names, 1.0)  # a task has weights, and these do not matter
+        task = self.problem.task(plant, targets, case, dummy)
+        row = {"case": name, **{key: task.actions.identity().get(key) for key in ("pulse", "C")}}
+        chosen, usual = self._chosen(targets), Weights()._chosen(targets)
+        weights, how, action = {}, "thesis 4.4.5", np.full(len(task.actions.names), np.nan)
         try:
             resolved = resolve(task, chosen)
-            weights = solve_weights(task, resolved, steps)
+            weights, action = solve_at(task, resolved, steps), resolved.action
         except InputError as error:
-            raise InputError(f"case {case}: {error}") from error
-        return {
-            "case": case,
-            "variant": task.variant,
-            "C": task.onset,
-            **asdict(weights),
-            "B": resolved.B,
-            "D": resolved.D,
-            "k0": resolved.k0,
-        }
+            if chosen != usual or steps != Steps():
+                raise InputError(f"case {name}: {error}") from error
+        if chosen == usual and steps == Steps():
+            known, where = solve(task)
+            if known != weights:  # told by another saccade, which stands in the words
+                weights, how, action = known, where, np.full(len(action), np.nan)
+        told = [float(value) if np.isfinite(value) else None for value in action]
+        return {**row, **weights, **dict(zip(task.actions.names, told, strict=True)), "how": how}
+
+    def _chosen(self, targets: "Targets") -> "ChosenSaccade":
+        from orient_eye.cli.saccades import direction
+        from orient_eye.task.solved_weights import ChosenSaccade
+
+        start, target = (
+            None if given is None else direction(targets.angles, given, what)
+            for given, what in ((self.start, "start"), (self.target, "target"))
+        )
+        return ChosenSaccade(start, target, D=self.D, k0=self.k0, **({} if self.B is None else {"B": self.B}))
+
+
+def _weight(name: str) -> "Callable[[Row], str]":
+    return lambda row: f"{row[name]:.2e}".replace("e+0", "e")

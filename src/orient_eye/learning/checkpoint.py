@@ -1,9 +1,10 @@
 """Everything a training run needs to go on as if it had never stopped, in one file.
 
-Networks, optimizers, replay buffer, counters and the states of all random generators. The file is written
-whole or not at all, and read with torch's loader of plain tensors, which runs no code.
+Networks, optimizers, replay buffer, counters, the saccades in progress and the states of all random generators.
+The file is written whole or not at all, and read with torch's loader of plain tensors, which runs no code.
 """
 
+import io
 import json
 from pathlib import Path
 from pickle import UnpicklingError
@@ -12,11 +13,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from orient_eye.environments.saccade_env import SaccadeVecEnv
+from orient_eye.environments.sb3_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import OneStepSAC
+from orient_eye.state import State
 
 NAME = "checkpoint.pt"
 
@@ -27,10 +29,14 @@ def save_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv, extra: 
     Args:
         folder: of the run.
         model: the algorithm.
-        env: its environment.
+        env: its environment, with saccades begun.
         extra: plain values kept beside.
+
+    Raises:
+        InputError: it cannot be written.
     """
     buffer = _buffer(model)
+    assert env.batch.start is not None
     content = {
         "policy": model.policy.state_dict(),
         "actor_optimizer": model.actor.optimizer.state_dict(),
@@ -48,12 +54,15 @@ def save_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv, extra: 
                 "buffer_random": buffer.random.bit_generator.state,
                 "env_random": env.random.bit_generator.state,
                 "action_random": model.action_space.np_random.bit_generator.state,
-                "env_yaw": [a.tolist() for a in env.yaw_deg],
+                "start": env.batch.start.to_plain(),
+                "target": env.batch.target.tolist(),
                 "extra": extra,
             }
         ),
     }
-    return write_atomically(folder / NAME, lambda temporary: torch.save(content, temporary))
+    file = io.BytesIO()  # in memory first: what torch says of a full disk is no OSError
+    torch.save(content, file)
+    return write_atomically(folder / NAME, lambda temporary: temporary.write_bytes(file.getbuffer()))
 
 
 def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict[str, Any]:
@@ -65,6 +74,7 @@ def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict
     try:
         content = torch.load(folder / NAME, weights_only=True)
         plain = json.loads(content["plain"])
+        start, target = State.from_plain(plain["start"]), np.array(plain["target"], dtype=float)
         model.policy.load_state_dict(content["policy"])
         model.actor.optimizer.load_state_dict(content["actor_optimizer"])
         model.critic.optimizer.load_state_dict(content["critic_optimizer"])
@@ -75,13 +85,13 @@ def load_checkpoint(folder: Path, model: OneStepSAC, env: SaccadeVecEnv) -> dict
             model.ent_coef_optimizer.load_state_dict(content["temperature"]["optimizer"])
         buffer = _buffer(model)
         buffer.rows[: len(content["rows"])] = content["rows"].numpy()
-    except (OSError, EOFError, KeyError, ValueError, RuntimeError, UnpicklingError) as error:
+    except (OSError, EOFError, KeyError, TypeError, ValueError, RuntimeError, UnpicklingError) as error:
         raise InputError(f"the checkpoint in {folder} cannot be read, or does not fit this version: {error}") from error
     buffer.pos, buffer.full = plain["buffer_position"], plain["buffer_full"]
     model.num_timesteps, model._n_updates = plain["timesteps"], plain["updates"]
     buffer.random.bit_generator.state = plain["buffer_random"]
     model.action_space.np_random.bit_generator.state = plain["action_random"]
-    model._last_obs = env.begin(*(np.array(yaw) for yaw in plain["env_yaw"]))
+    model._last_obs = env.begin(start, target)
     env.random.bit_generator.state = plain["env_random"]
     torch.set_rng_state(content["torch_random"])
     if model.device.type == "cuda":

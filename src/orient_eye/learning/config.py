@@ -1,16 +1,27 @@
-"""What a training run is: every choice in one frozen dataclass, resolved before anything starts."""
+"""What a training run is: `TrainConfig` is what a user may say, `TrainSettings` what a run is made of.
+
+    settings = TrainConfig(plant="mujoco", updates=5000).resolved()
+
+In a `TrainConfig` None stands for what depends on the plant or the preset; in `TrainSettings` nothing is open.
+Their docstrings are the help of `orient-eye train`.
+"""
 
 import math
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from orient_eye.constants import BAND, SPEED_LIMIT
 from orient_eye.errors import InputError
+
+if TYPE_CHECKING:
+    from orient_eye.task.saccade import SaccadeTask
 
 
 def _default(words: str) -> Any:
-    """What the command line says of a default that depends on the plant."""
+    """What the command line says of a default that depends on something."""
     return tyro.conf.arg(help_behavior_hint=f"(default: {words})")
 
 
@@ -37,96 +48,200 @@ _PRESETS: dict[str, dict[str, Any]] = {
         "reward_scale": "raw",
     },
 }
+_LARGEST = {
+    "updates": 10**9,
+    "saccades_per_update": 10**5,
+    "batch_size": 10**6,
+    "replay_size": 10**8,
+    "warmup": 10**8,
+    "evaluation_pairs": 10**5,
+}
 
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """Options of a training run. Where a default depends on the plant, None stands for it."""
+    """Options of a training run. Where a default depends on something, None stands for it."""
 
-    plant: Literal["lpf", "mujoco", "tavares"] = "lpf"
-    """What the policy learns on: the low-pass surrogate, the MuJoCo eye, or the NumPy reference."""
-    surrogate: str = "thesis"
-    """For lpf: a surrogate.json written by sysid, or the name of a shipped one."""
-    eye: str = "thesis"
-    """For mujoco and tavares: preset of the eye."""
-    case: Literal["1", "2-fixed", "2-varying", "3-fixed", "3-varying"] = "1"
-    """Pulse of the motor command and its onset rate C: one of the thesis' five cases (4.3, 5.1 to 5.3)."""
-    speed_limit: float = 7200.0
-    """Motor speed to which a varying C brings the command, deg/s."""
-    weights: Annotated[tuple[float, float, float, float] | None, _default("those of the case on the plant")] = None
-    """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32; orient-eye weights)."""
-    band: float = 0.01
-    """Settling band, share of the amplitude."""
+    plant: str = "lpf"
+    """Plant on which the policy learns."""
+    plant_options: dict[str, Any] = field(default_factory=dict)
+    """Options of that plant, by name."""
+    case: str = "1"
+    """Learning case: the pulse of the motor command and its onset rate C (thesis 4.3, 5.1 to 5.3)."""
+    targets: str = "horizontal"
+    """Set of targets between which saccades are made."""
+    driven: Annotated[tuple[str, ...] | None, _default("those that the targets need")] = None
+    """Motors that the policy commands; the others stay where they are."""
+    speed_limit: float = SPEED_LIMIT
+    """Motor speed to which a varying C brings the command, in deg/s."""
+    weights: Annotated[
+        tuple[float, ...] | dict[str, float] | None,
+        tyro.conf.arg(metavar="WEIGHT ...", help_behavior_hint="(default: those of the case on the plant)"),
+    ] = None
+    """Weights of the reward's terms: accuracy, energy, duration, overshoot (thesis 4.32; see orient-eye weights)."""
+    band: float = BAND
+    """Settling band as a share of the amplitude: the saccade lasts until the eye stays within it."""
+    horizon_s: Annotated[float | None, _default("the plant's own")] = None
+    """How long a simulated saccade lasts, in s."""
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
     updates: Annotated[int | None, _default("14000; thesis 300000")] = None
-    """Updates of the networks."""
-    saccades_per_update: Annotated[int | None, _default("128 on lpf, 32 on other plants; thesis 1")] = None
-    """Fresh saccades before each update."""
+    """How many times the networks are updated."""
+    saccades_per_update: Annotated[int | None, _default("128 in closed form, 32 simulated; thesis 1")] = None
+    """Fresh saccades performed before each update."""
     batch_size: Annotated[int | None, _default("1024; thesis 8196")] = None
-    """Saccades an update learns from."""
+    """Saccades that one update learns from."""
     replay_size: Annotated[int | None, _default("300000; thesis 30000")] = None
-    """Saccades the replay buffer holds."""
+    """Saccades that the replay buffer holds."""
     warmup: Annotated[int | None, _default("2048; thesis 8196")] = None
     """Saccades with random actions before the first update."""
     learning_rate: Annotated[float | None, _default("0.001; thesis 0.00001")] = None
-    """Of Adam."""
+    """Learning rate of the optimiser (Adam)."""
     last_learning_rate: Annotated[float | None, _default("0.03; thesis 1")] = None
-    """Share of the learning rate to which it falls, linearly, over the last fifth of the run."""
+    """Share of the learning rate that is left at the end; it falls linearly over the last fifth of the run."""
     temperature: Annotated[tuple[float, float] | Literal["auto"] | None, _default("1 0.001; thesis auto")] = None
-    """Entropy temperature: first and last (it falls geometrically over the first 80 % of the run), or auto for
-    SB3's automatic rule."""
+    """Entropy temperature at the beginning and at the end; it falls geometrically over the first 80 % of the run.
+    With auto it follows the automatic rule of Stable-Baselines3."""
     reward_scale: Annotated[Literal["log", "raw"] | None, _default("log; thesis raw")] = None
-    """Learn on the logarithm of the reward, which has the same optimal policy, or on the reward itself."""
+    """Whether to learn on the logarithm of the reward, which has the same optimal policy, or on the raw reward."""
     device: str = "cpu"
-    """Where the networks live: cpu, cuda, or cuda:NUMBER."""
-    evaluation_pairs: Annotated[int | None, _default("300 on lpf, 60 on other plants")] = None
-    """Random saccades held against the searched optimum."""
+    """Device on which the networks live: cpu, cuda, or cuda:NUMBER."""
+    evaluation_pairs: Annotated[int | None, _default("300 in closed form, 60 simulated")] = None
+    """Random saccades on which the policy is held against the searched optimum."""
     seed: int = 0
-    """Of everything random."""
+    """Seed of everything random in the run."""
 
-    def resolved(self) -> "TrainConfig":
-        """The configuration with no None left.
+    def make_task(self) -> "SaccadeTask":
+        """Plant, actions, targets and reward that the options describe.
 
         Raises:
-            InputError: a number out of its range.
+            InputError: an unknown name, or options that do not go together.
         """
-        from orient_eye.task.cases import get_case  # the physics, which --help does not wait for
+        from orient_eye.plants import make_plant  # the physics, which --help does not wait for
+        from orient_eye.task.saccade import SaccadeTask
 
-        closed_form = self.plant == "lpf"
-        weights = get_case(self.case).weights(self.plant)
-        defaults = {
-            "saccades_per_update": 128 if closed_form else 32,
+        return SaccadeTask.of_case(
+            make_plant(self.plant, **self.plant_options),
+            self.case,
+            targets=self.targets,
+            driven=self.driven,
+            weights=self.weights,
+            band=self.band,
+            speed_limit=self.speed_limit,
+            horizon_s=self.horizon_s,
+        )
+
+    def resolved(self, task: "SaccadeTask | None" = None) -> "TrainSettings":
+        """The settings of a run, with nothing left open.
+
+        Args:
+            task: from `make_task`, where it is made already.
+
+        Raises:
+            InputError: an unknown name, options that do not go together, or a number out of its range.
+        """
+        if self.preset not in _PRESETS:
+            raise InputError(f"unknown preset {self.preset!r}; choose one of {', '.join(_PRESETS)}")
+        task = task or self.make_task()
+        shared = {f.name for f in fields(TrainSettings)} & {f.name for f in fields(TrainConfig)}
+        values: dict[str, Any] = {
+            "saccades_per_update": task.plant.pace.saccades_per_update,
+            "evaluation_pairs": task.plant.pace.evaluation_pairs,
             **_PRESETS[self.preset],
-            "weights": (weights.accuracy, weights.energy, weights.duration, weights.overshoot),
-            "evaluation_pairs": 300 if closed_form else 60,
+            **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},
         }
-        config = replace(self, **{k: v for k, v in defaults.items() if getattr(self, k) is None})
-        for name in ("updates", "saccades_per_update", "batch_size", "replay_size", "warmup", "evaluation_pairs"):
-            if getattr(config, name) < 1:
-                raise InputError(f"--{name.replace('_', '-')} must be at least 1, got {getattr(config, name)}")
-        for name in ("learning_rate", "last_learning_rate", "temperature"):
-            value = getattr(config, name)
-            numbers = value if isinstance(value, tuple) else (value,)
-            if value != "auto" and not all(0 < number < math.inf for number in numbers):
-                raise InputError(f"--{name.replace('_', '-')} must be positive and finite, got {value}")
-        assert config.last_learning_rate
-        if config.last_learning_rate > 1:
-            raise InputError(f"--last-learning-rate is a share, at most 1, got {config.last_learning_rate}")
-        if config.seed < 0:
-            raise InputError(f"--seed must not be negative, got {config.seed}")
-        _check_device(config.device)
-        return config
+        return TrainSettings(task=task.identity(), weights_from=task.weights_from, **values)
+
+
+@dataclass(frozen=True)
+class TrainSettings:
+    """A training run with nothing left open: what run.json holds, and all that a run is made of.
+
+    Attributes:
+        task: identity of plant, actions, targets and reward (`SaccadeTask.identity`).
+        weights_from: where the reward's weights are from, in words.
+        case: name of the learning case.
+
+    The others are those of `TrainConfig`.
+
+    Raises:
+        InputError: a number out of its range, or a device that is not there.
+    """
+
+    task: dict[str, Any]
+    weights_from: str
+    case: str
+    updates: int
+    saccades_per_update: int
+    batch_size: int
+    replay_size: int
+    warmup: int
+    learning_rate: float
+    last_learning_rate: float
+    temperature: tuple[float, float] | Literal["auto"]
+    reward_scale: Literal["log", "raw"]
+    device: str
+    evaluation_pairs: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        for name, largest in _LARGEST.items():
+            value = getattr(self, name)
+            _require(_whole(value) and 1 <= value <= largest, name, f"a whole number from 1 to {largest}", value)
+        _require(_positive(self.learning_rate), "learning_rate", "positive and finite", self.learning_rate)
+        share = self.last_learning_rate
+        _require(_positive(share) and share <= 1, "last_learning_rate", "a share above 0, at most 1", share)
+        temperature: Any = self.temperature
+        if isinstance(temperature, list):  # as JSON has it
+            temperature = tuple(temperature)
+            object.__setattr__(self, "temperature", temperature)
+        pair = isinstance(temperature, tuple) and len(temperature) == 2 and all(map(_positive, temperature))
+        words = "'auto', or a first and a last one, positive and finite"
+        _require(temperature == "auto" or pair, "temperature", words, temperature)
+        _require(self.reward_scale in ("log", "raw"), "reward_scale", "log or raw", self.reward_scale)
+        _require(_whole(self.seed) and self.seed >= 0, "seed", "a whole number, not negative", self.seed)
+        _check_device(self.device)
+
+    def make_task(self) -> "SaccadeTask":
+        """The task again, as it was."""
+        from orient_eye.task.saccade import SaccadeTask
+
+        return replace(SaccadeTask.restore(self.task), weights_from=self.weights_from)
+
+    @classmethod
+    def from_plain(cls, content: Mapping[str, Any]) -> "TrainSettings":
+        """The settings that run.json holds.
+
+        Raises:
+            InputError: they are not of this version.
+        """
+        try:
+            return cls(**content)
+        except TypeError as error:
+            raise InputError(f"these settings are not of this version of orient-eye: {error}") from error
+
+
+def _require(fits: bool, name: str, allowed: str, value: Any) -> None:
+    if not fits:
+        raise InputError(f"{name.replace('_', ' ')} must be {allowed}, got {value!r}")
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _positive(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < math.inf
 
 
 def _check_device(name: str) -> None:
-    kind, _, number = name.partition(":")
+    kind, _, number = str(name).partition(":")
     if kind not in ("cpu", "cuda") or (number and not number.isdecimal()):
-        raise InputError(f"--device is cpu, cuda or cuda:NUMBER, got {name!r}")
+        raise InputError(f"device must be cpu, cuda or cuda:NUMBER, got {name!r}")
     if kind == "cuda":
         import torch
 
         if int(number or 0) >= torch.cuda.device_count():
             raise InputError(
-                f"--device {name}: torch sees {torch.cuda.device_count()} CUDA devices on this machine; use cpu"
+                f"device {name}: torch sees {torch.cuda.device_count()} CUDA devices on this machine; use cpu"
             )

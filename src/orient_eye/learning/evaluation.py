@@ -10,15 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye import rotations
 from orient_eye.search.optimum import Optimum
 from orient_eye.search.optimum_cache import searched_optimum
-from orient_eye.task.saccade import Fixation, Outcome, SaccadeTask, horizontal
+from orient_eye.state import State
+from orient_eye.task.saccade import Outcome, SaccadeTask
 
 Array = NDArray[np.float64]
 Act = Callable[[Array, Array], Array]
-"""From starts and targets (saccades, 4) to actions (saccades, driven, 3)."""
+"""From starts and targets (saccades, 4) to actions in units (saccades, numbers)."""
 TABLE_AMPLITUDES_DEG = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0)
 """Amplitudes of the table at the end of a run; symmetric saccades."""
+LARGE_DEG = 5.0
+"""Above this size the distance from the best action is told: of smaller ones B and k0 hardly matter."""
 _SEED = 2021
 
 
@@ -27,52 +31,50 @@ class Yardstick:
     """Saccades whose optimum is known.
 
     Attributes:
-        task: plant, command and reward.
-        start_yaw_deg: (saccades,).
-        target_yaw_deg: (saccades,).
-        start: the same as fixations.
-        target: the same as orientations.
+        task: plant, actions and reward.
+        start: of the eyes, of (saccades,).
+        target: desired orientations, (saccades, 4).
         optimum: best actions and rewards found.
     """
 
     task: SaccadeTask
-    start_yaw_deg: Array
-    target_yaw_deg: Array
-    start: Fixation
+    start: State
     target: Array
     optimum: Optimum
 
     @classmethod
     def search(
-        cls,
-        task: SaccadeTask,
-        start_yaw_deg: Array,
-        target_yaw_deg: Array,
-        progress: Callable[[float], None] | None = None,
+        cls, task: SaccadeTask, start: State, target: Array, progress: Callable[[float], None] | None = None
     ) -> "Yardstick":
-        """Search the optimum of saccades between these gaze directions [deg], each (saccades,), or remember it."""
-        optimum = searched_optimum(task, start_yaw_deg, target_yaw_deg, progress=progress)
-        start = task.fixate(horizontal(start_yaw_deg))
-        return cls(task, start_yaw_deg, target_yaw_deg, start, horizontal(target_yaw_deg), optimum)
+        """Search the optimum of saccades, or remember it."""
+        return cls(task, start, target, searched_optimum(task, start, target, progress=progress))
 
     def __getitem__(self, which: slice) -> "Yardstick":
-        index = np.arange(len(self.target))[which]
         optimum = Optimum(self.optimum.action[which], self.optimum.reward[which], self.optimum.evaluations)
-        yaw = self.start_yaw_deg[which], self.target_yaw_deg[which]
-        return Yardstick(self.task, *yaw, self.start[index], self.target[which], optimum)
+        return Yardstick(self.task, self.start[which], self.target[which], optimum)
+
+    @property
+    def size_deg(self) -> Array:
+        """Angle from start to target, (saccades,)."""
+        return rotations.angle_between(self.start.orientation, self.target)
 
     def perform(self, act: Act) -> tuple[Array, Outcome, Array]:
-        """The policy's actions (saccades, driven, 3), what came of them, and the gaps (saccades,)."""
+        """The policy's actions (saccades, numbers), what came of them, and the gaps (saccades,)."""
         action = act(self.start.orientation, self.target)
         outcome = self.task.perform(self.start, action, self.target)
         gap = (self.optimum.reward - outcome.reward.total) / np.abs(self.optimum.reward)
         return action, outcome, gap
 
     def to_plain(self) -> dict[str, Any]:
-        """Plain values, for a run's directory."""
+        """Plain values, for a run's directory; starts and targets by the angles of the task's targets."""
+        angles = self.task.targets.angles_of
+        told = {"start": angles(self.start.orientation), "target": angles(self.target)}
         return {
-            "start_yaw_deg": self.start_yaw_deg.tolist(),
-            "target_yaw_deg": self.target_yaw_deg.tolist(),
+            **{
+                f"{what}_{name}": values[:, k].tolist()
+                for what, values in told.items()
+                for k, name in enumerate(self.task.targets.angles)
+            },
             "action": self.optimum.action.tolist(),
             "reward": self.optimum.reward.tolist(),
             "evaluations": self.optimum.evaluations,
@@ -82,14 +84,69 @@ class Yardstick:
 def evaluation_saccades(
     task: SaccadeTask, count: int, progress: Callable[[float], None] | None = None
 ) -> tuple[Yardstick, Yardstick]:
-    """Random saccades over the whole range, and symmetric ones of the table's amplitudes.
+    """Random saccades over the whole range, and symmetric ones of the table's amplitudes, as far as the range goes.
 
-    They depend on nothing but their number, so that runs can be compared and their optimum is searched once.
+    They depend on nothing but the targets and their number, so that runs can be compared and their optimum is
+    searched once.
     """
-    start, target = task.draw_yaw(count, np.random.default_rng(_SEED))
-    half = np.array(TABLE_AMPLITUDES_DEG) / 2
-    both = Yardstick.search(task, np.concatenate([start, -half]), np.concatenate([target, half]), progress)
+    targets = task.targets
+    start, target = targets.draw(count, np.random.default_rng(_SEED))
+    angles = targets.symmetric(np.array(TABLE_AMPLITUDES_DEG))
+    if not len(angles[0]):
+        angles = targets.symmetric(np.array([2 * targets.limit_deg]))
+    low, high = map(targets.orientation, angles)
+    start = targets.rest(np.concatenate([start.orientation, low]))
+    both = Yardstick.search(task, start, np.concatenate([target, high]), progress)
     return both[:count], both[count:]
+
+
+@dataclass(frozen=True)
+class Told:
+    """A number of an action as tables and pictures tell it: a position from where its motor starts, D - F for D.
+
+    Attributes:
+        key: for tables: "B", "step_deg"; of several motors "B_motor1", "step_motor1_deg".
+        label: for people: "B", "D - F".
+        unit: "1/s".
+        motor: that it commands; "" for several.
+        from_start: whether it is told from where the motor starts.
+        index: among the action's numbers.
+    """
+
+    key: str
+    label: str
+    unit: str
+    motor: str
+    from_start: bool
+    index: int
+
+    @property
+    def title(self) -> str:
+        """Label with unit."""
+        return f"{self.label} [{self.unit}]"
+
+
+def told_numbers(task: SaccadeTask) -> tuple[Told, ...]:
+    """How the numbers of a task's actions are told."""
+    units = {motor.name: motor.unit for motor in task.plant.motors}
+    several = len({number.motor for number in task.actions.numbers}) > 1
+    told = []
+    for i, (name, number) in enumerate(zip(task.actions.names, task.actions.numbers, strict=True)):
+        position = units.get(number.motor) == number.unit
+        step = f"step_{number.motor}_{number.unit}" if several else f"step_{number.unit}"
+        label = f"{number.symbol} - F" if position else number.symbol
+        told.append(Told(step if position else name, label, number.unit, number.motor, position, i))
+    return tuple(told)
+
+
+def told_values(task: SaccadeTask, start: State, action: Array) -> Array:
+    """Actions (saccades, numbers) as `told_numbers` tells them."""
+    values = action.copy()
+    column = {motor.name: i for i, motor in enumerate(task.plant.motors)}
+    for told in told_numbers(task):
+        if told.from_start:
+            values[:, told.index] -= start.motor[:, column[told.motor]]
+    return values
 
 
 def gap_summary(yardstick: Yardstick, action: Array, outcome: Outcome, gap: Array) -> dict[str, Any]:
@@ -100,9 +157,14 @@ def gap_summary(yardstick: Yardstick, action: Array, outcome: Outcome, gap: Arra
         action: what the policy chose, as `Yardstick.perform` returns it.
         outcome: what came of it.
         gap: the gaps.
+
+    Returns:
+        The gaps; how far the action's numbers are from the best ones, by name; and `numbers`, how they are told in
+        `amplitude_table`: key, label and unit of each.
     """
-    large = np.abs(yardstick.target_yaw_deg - yardstick.start_yaw_deg) > 5
+    large = yardstick.size_deg > LARGE_DEG
     off = np.abs(action - yardstick.optimum.action)[large]
+    names = yardstick.task.actions.names
     return {
         "pairs": len(gap),
         "gap_mean": float(gap.mean()),
@@ -110,32 +172,31 @@ def gap_summary(yardstick: Yardstick, action: Array, outcome: Outcome, gap: Arra
         "gap_max": float(gap.max()),
         "reward_mean": float(outcome.reward.total.mean()),
         "distance_from_optimum_above_5_deg": dict(
-            zip(["B", "D", "k0"], off.mean(axis=(0, 1)).tolist() if large.any() else [None] * 3, strict=True)
+            zip(names, off.mean(axis=0).tolist() if large.any() else [None] * len(names), strict=True)
         ),
+        "numbers": [{"key": n.key, "label": n.label, "unit": n.unit} for n in told_numbers(yardstick.task)],
     }
 
 
 def amplitude_table(yardstick: Yardstick, act: Act) -> list[dict[str, float]]:
-    """One row a saccade: the learned action, the best one found, rewards, gap, and the measures."""
+    """One row a saccade: amplitude, the numbers of the learned and of the best action, rewards, gap and measures.
+
+    The numbers stand under their keys (`told_numbers`), the best ones under KEY_best.
+    """
+    task = yardstick.task
     action, outcome, gap = yardstick.perform(act)
-    best, F = yardstick.optimum.action, yardstick.start.motor[:, yardstick.task.driven_index]
     measures = outcome.measures
-    return [
-        {
-            "amplitude_deg": float(yardstick.target_yaw_deg[i] - yardstick.start_yaw_deg[i]),
-            "B": float(action[i, 0, 0]),
-            "B_best": float(best[i, 0, 0]),
-            "step_deg": float(action[i, 0, 1] - F[i, 0]),
-            "step_deg_best": float(best[i, 0, 1] - F[i, 0]),
-            "k0": float(action[i, 0, 2]),
-            "k0_best": float(best[i, 0, 2]),
-            "reward": float(outcome.reward.total[i]),
-            "reward_best": float(yardstick.optimum.reward[i]),
-            "gap": float(gap[i]),
-            "duration_ms": float(1e3 * measures.settling_time_s[i]),
-            "peak_velocity_deg_s": float(measures.peak_velocity_deg_s[i]),
-            "skewness": float(measures.skewness[i]),
-            "overshoot": float(measures.overshoot[i]),
-        }
-        for i in range(len(gap))
-    ]
+    ours, best = (told_values(task, yardstick.start, a) for a in (action, yardstick.optimum.action))
+    columns: dict[str, Array] = {"amplitude_deg": yardstick.size_deg.round(9)}
+    for number in told_numbers(task):
+        columns |= {number.key: ours[:, number.index], f"{number.key}_best": best[:, number.index]}
+    columns |= {
+        "reward": outcome.reward.total,
+        "reward_best": yardstick.optimum.reward,
+        "gap": gap,
+        "duration_ms": 1e3 * measures.settling_time_s,
+        "peak_velocity_deg_s": measures.peak_velocity_deg_s,
+        "skewness": measures.skewness,
+        "overshoot": measures.overshoot,
+    }
+    return [{name: float(values[i]) for name, values in columns.items()} for i in range(len(gap))]

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
-from orient_eye.environments.saccade_env import SaccadeVecEnv, observe, to_action
+from orient_eye.environments.batch import observe
+from orient_eye.environments.sb3_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.files import write_table
 from orient_eye.learning.checkpoint import save_checkpoint
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.sac import OneStepSAC
+from orient_eye.progress import Advance
 
 Array = NDArray[np.float64]
 STAGES = (0.0, 0.1, 0.25, 0.5, 1.0)
@@ -41,22 +41,20 @@ class TrainingLoop(BaseCallback):
         updates: int,
         yardstick: Yardstick,
         table: Yardstick,
-        bar: Progress,
-        ctrl_c: "CtrlC",
+        advance: Advance,
+        request: "StopRequest",
         checkpoint_s: float,
     ) -> None:
         super().__init__()
         self.checkpoint_s = checkpoint_s
-        self.folder, self.env, self.yardstick, self.table, self.ctrl_c = folder, env, yardstick, table, ctrl_c
-        self.updates = updates
+        self.folder, self.env, self.yardstick, self.table, self.request = folder, env, yardstick, table, request
+        self.updates, self.advance = updates, advance
         self.every = max(1, self.updates // _EVALUATIONS)
         self.rows: list[dict[str, float]] = []
         self.rewards: list[float] = []
         self.failed, self.elapsed = 0, 0.0
         self.began = self.resumed = self.saved = time.monotonic()
         self.done_before, self.evaluated = 0, -1
-        self.bar = bar
-        self.job = bar.add_task("training", total=self.updates, note="")
 
     @property
     def algorithm(self) -> OneStepSAC:
@@ -86,7 +84,7 @@ class TrainingLoop(BaseCallback):
         if not self.algorithm.finite():
             raise InputError(
                 f"the training diverged at update {n}: the networks hold numbers that are not finite; "
-                "start a new run with a smaller --learning-rate"
+                "start a new run with a smaller learning rate"
             )
         if n % self.every == 0 and n != self.evaluated:
             self._evaluate(n)
@@ -96,8 +94,8 @@ class TrainingLoop(BaseCallback):
             note = f"reward {row['reward_mean']:.3g}  gap {100 * row['gap_mean']:.2f} %  {speed:.0f} updates/s"
             if self.failed:
                 note += f"  [red]{self.failed} saccades failed[/red]"
-            self.bar.update(self.job, completed=n, note=note)
-        if self.ctrl_c.pressed:
+            self.advance(n / self.updates, note)
+        if self.request.signal is not None:
             self._save()
             raise Stop
         if time.monotonic() - self.saved > self.checkpoint_s:
@@ -120,7 +118,7 @@ class TrainingLoop(BaseCallback):
 
     def _act(self, start: Array, target: Array) -> Array:
         scaled, _ = self.algorithm.predict(observe(start, target), deterministic=True)
-        return to_action(self.env.task, scaled)
+        return self.env.task.actions.from_unit(scaled)
 
     def _evaluate(self, n: int) -> None:
         _, _, gap = self.yardstick.perform(self._act)
@@ -147,8 +145,8 @@ class TrainingLoop(BaseCallback):
                 self._record_stage(stage)
 
     def _record_stage(self, stage: float) -> None:
-        start = self.table.start
-        trajectory = self.env.task.trajectory(start, self._act(start.orientation, self.table.target))
+        start, target = self.table.start, self.table.target
+        trajectory = self.env.task.trajectory(start, self._act(start.orientation, target), target)
         trajectory.save_npz(self.folder / "stages" / f"{round(100 * stage):03d}.npz")
 
     def _write_metrics(self) -> None:
@@ -168,39 +166,33 @@ class TrainingLoop(BaseCallback):
         self.writer.flush()
 
 
-class CtrlC:
-    """Ctrl-C asks for a stop at the next update; pressed again it stops at once."""
+class StopRequest:
+    """Ctrl-C, or a signal to end, asks for a stop at the next update; sent again it stops at once.
+
+    Attributes:
+        signal: that was received; None as long as there is none.
+    """
 
     def __init__(self) -> None:
-        self.pressed = False
+        self.signal: int | None = None
+        self.before: dict[int, Any] = {}
 
-    def __enter__(self) -> "CtrlC":
-        try:
-            self.before = signal.signal(signal.SIGINT, self._handle)
-        except ValueError:  # not in the main thread: Python's own handler stays
-            self.before = None
+    def __enter__(self) -> "StopRequest":
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            try:
+                if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup has it
+                    self.before[number] = signal.signal(number, self._handle)
+            except ValueError:  # not in the main thread: Python's own handlers stay
+                break
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self.before is not None:
-            signal.signal(signal.SIGINT, self.before)
+        for number, handler in self.before.items():
+            signal.signal(number, handler)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if self.pressed:
+        if self.signal is not None:
             raise KeyboardInterrupt
-        self.pressed = True
-
-
-def progress_bar(quiet: bool) -> Progress:
-    """A bar on standard error, or nothing."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=Console(stderr=True),
-        disable=quiet,
-    )
+        self.signal = number

@@ -4,7 +4,7 @@
     export_sb3(policy, "policy.zip")
     policy = import_sb3("policy.zip", SaccadeTask.of_case(make_plant("lpf"), "1"))
 
-The ONNX graph holds everything from the quaternions to B, D, k0 in units, in float32. An SB3 zip holds
+The ONNX graph holds everything from the quaternions to actions in units, in float32. An SB3 zip holds
 pickles: `SAC.load` runs the code of whoever wrote it, so load only files of people you trust.
 `import_sb3` reads nothing but the tensors, which runs no code.
 """
@@ -18,9 +18,10 @@ import numpy as np
 
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically
-from orient_eye.learning.policy import GAZE_INPUTS, Policy
+from orient_eye.learning.features import GAZE_INPUTS, UNIT_DEG
+from orient_eye.learning.policy import Policy
 from orient_eye.run_directory import versions
-from orient_eye.task.saccade import YAW_RANGE_DEG, SaccadeTask
+from orient_eye.task.saccade import SaccadeTask
 
 if TYPE_CHECKING:
     import onnx
@@ -30,7 +31,7 @@ _NO_SPREAD = -20.0  # log of the standard deviation, SB3's least
 
 
 def export_onnx(policy: Policy, path: str | Path) -> Path:
-    """Write an ONNX model: inputs start (n, 4) and target (n, 4), output action (n, driven, 3).
+    """Write an ONNX model: inputs start (n, 4) and target (n, 4), output action (n, numbers), in units.
 
     Args:
         policy: to export.
@@ -62,17 +63,17 @@ class _Graph:
         from onnx import TensorProto, helper
 
         policy = self.policy
+        numbers = ", ".join(f"{number['name']} [{number['unit']}]" for number in policy.manifest["numbers"])
         self._scale(self._network(self._features()))
         quaternion: list[str | int | None] = ["saccades", 4]
-        action: list[str | int | None] = ["saccades", *policy.low.shape]
+        action: list[str | int | None] = ["saccades", policy.low.size]
         graph = helper.make_graph(
             self.nodes,
             "orient_eye_policy",
             [helper.make_tensor_value_info(name, TensorProto.FLOAT, quaternion) for name in ("start", "target")],
             [helper.make_tensor_value_info("action", TensorProto.FLOAT, action)],
             self.constants,
-            doc_string="Orientations (w, x, y, z) of start and target; action: B [1/s], D [deg], k0 [1/s] of each "
-            f"driven motor ({', '.join(policy.manifest['task']['driven'])}).",
+            doc_string=f"Orientations (w, x, y, z) of start and target; action: {numbers}.",
         )
         opset = helper.make_opsetid("", _OPSET)
         model = helper.make_model(graph, opset_imports=[opset], ir_version=_IR_VERSION, producer_name="orient-eye")
@@ -109,7 +110,7 @@ class _Graph:
         v = self._node("Sub", self._mul(aw, bv), self._mul(bw, av))
         v = self._node("Add", v, self._cross(av, bv))
         both = self._node("Concat", self._rotation_vector(aw, av), self._rotation_vector(w, v), axis=1)
-        return self._mul(both, self._constant(1 / np.deg2rad(YAW_RANGE_DEG[1])))
+        return self._mul(both, self._constant(1 / np.deg2rad(UNIT_DEG)))
 
     def _mul(self, a: str, b: str) -> str:
         return self._node("Mul", a, b)
@@ -136,17 +137,20 @@ class _Graph:
         return x
 
     def _scale(self, x: str) -> str:
-        """From -1 .. 1 to B, D, k0."""
-        low, high = self.policy.low, self.policy.high
-        x = self._node("Reshape", x, self._constant([-1, *low.shape], np.int64))
+        """From -1 .. 1 to units, on a linear or a logarithmic scale."""
+        log = self.policy.log
+        low, high = (
+            np.where(log, np.log(np.where(log, bound, 1)), bound) for bound in (self.policy.low, self.policy.high)
+        )
         x = self._mul(x, self._constant((high - low) / 2))
-        return self._node("Add", x, self._constant((high + low) / 2), name="action")
+        x = self._node("Add", x, self._constant((high + low) / 2))
+        return self._node("Where", self._constant(log, bool), self._node("Exp", x), x, name="action")
 
 
 def export_sb3(policy: Policy, path: str | Path) -> Path:
     """Write a Stable-Baselines3 zip: `OneStepSAC.load(path).predict(observation)` gives the scaled action.
 
-    Observation and scaled action are those of `SaccadeEnv`; `to_action(task, scaled)` gives B, D, k0. A
+    Observation and scaled action are those of `SaccadeEnv`; `task.actions.from_unit(scaled)` gives units. A
     policy file holds the mean only: the zip's spread is nil and its Q network untrained. Loading the zip
     needs orient-eye, and runs code (pickle).
     """
@@ -219,15 +223,8 @@ def import_sb3(path: str | Path, task: SaccadeTask) -> Policy:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path} is no zip of a Stable-Baselines3 SAC: {error}") from error
-    manifest = {
-        "case": None,
-        "task": task.identity(),
-        "config": {},
-        "versions": versions(),
-        "result": {},
-        "source": f"imported from the Stable-Baselines3 zip {Path(path).name}",
-    }
-    return Policy(weights, biases, task.action_low, task.action_high, manifest)
+    source = f"imported from the Stable-Baselines3 zip {Path(path).name}"
+    return Policy.of_task(task, weights, biases, case=None, config={}, versions=versions(), result={}, source=source)
 
 
 def _class_name(written: Any) -> str:

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from typing import Any, cast
 
-import numpy as np
 import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
@@ -18,36 +17,23 @@ from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch import Tensor, nn
 
 from orient_eye.errors import InputError
+from orient_eye.learning.features import GAZE_INPUTS
 from orient_eye.learning.network import Network, flatten, take_step
-from orient_eye.task.saccade import YAW_RANGE_DEG
+from orient_eye.learning.torch_policy import gaze_features
 
 Schedule = Callable[[float], float]
 _HALF_LOG_2_PI = 0.5 * math.log(2 * math.pi)
-_GAZE_RANGE_RAD = float(np.deg2rad(YAW_RANGE_DEG[1]))
 
 
 class GazeFeatures(BaseFeaturesExtractor):
-    """A fixed change of coordinates before the networks: nothing is learned here.
-
-    From the quaternions of start and target to the rotation vectors of the start and of the turn from
-    start to target, in units of 35 deg: for gaze directions the quaternions differ in the second digit
-    only.
-    """
+    """A fixed change of coordinates before the networks (`gaze_features`): nothing is learned here."""
 
     def __init__(self, observation_space: Any) -> None:
-        super().__init__(observation_space, features_dim=6)
+        super().__init__(observation_space, features_dim=GAZE_INPUTS)
 
     def forward(self, observations: Tensor) -> Tensor:
         """Features (batch, 6) of observations (batch, 8)."""
-        a, b = observations.split(4, dim=1)
-        (aw, av), (bw, bv) = a.split((1, 3), dim=1), b.split((1, 3), dim=1)
-        turn_w = (a * b).sum(dim=1, keepdim=True)  # turn = b a^-1
-        turn_v = aw * bv - bw * av + torch.linalg.cross(av, bv)
-        # Rotation vectors of both at once: angle times axis.
-        w, v = torch.stack([aw, turn_w], dim=1), torch.stack([av, turn_v], dim=1)
-        size = torch.linalg.vector_norm(v, dim=2, keepdim=True).clamp_min(1e-7)
-        half_angle = torch.atan2(size, w.abs()) * torch.sign(w)
-        return (v * (half_angle / size)).flatten(1) * (2 / _GAZE_RANGE_RAD)
+        return gaze_features(observations)
 
 
 def falling_temperature(first: float = 1.0, last: float = 1e-3, until: float = 0.8) -> Schedule:

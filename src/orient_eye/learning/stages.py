@@ -7,7 +7,7 @@ import numpy as np
 from orient_eye.errors import InputError
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.movement.trajectory import Trajectory, concatenate
-from orient_eye.recording import model_of, record
+from orient_eye.recording import record
 from orient_eye.task.saccade import SaccadeTask
 
 
@@ -21,16 +21,15 @@ def record_stages(task: SaccadeTask, folder: Path, table: Yardstick) -> Path:
     if not files:
         raise InputError(f"{folder} has no stages to record")
     parts = [Trajectory.load_npz(file) for file in files]
-    parts.append(task.trajectory(table.start, table.optimum.action))
+    parts.append(task.trajectory(table.start, table.optimum.action, table.target))
     names = [f"trained {int(file.stem)} %" for file in files] + ["searched optimum"]
-    amplitude = table.target_yaw_deg - table.start_yaw_deg
     return record(
         folder / "recording.rrd",
         concatenate(parts),
-        model=model_of(task.plant.identity()),
+        model=task.plant.drawn(),
         target=np.concatenate([table.target] * len(parts)),
-        titles=[f"{a:g} deg" for a in amplitude] * len(parts),
-        groups=[name for name in names for _ in amplitude],
+        titles=[f"{size:g} deg" for size in table.size_deg] * len(parts),
+        groups=[name for name in names for _ in table.size_deg],
         notes=f"Evaluation saccades of the training run `{folder.name}` on plant `{task.plant.name}`, at several "
         "stages of the training, and with the best action a search found.",
     )

@@ -1,27 +1,26 @@
 """Measures of a saccade: settling time, peak velocity, skewness, overshoot (thesis 2.1.3, 4.4).
 
     measured = measure(trajectory, final)            # from samples, any plant
-    measured = measure_response(plant.respond(pulse_steps))   # low-pass plant, closed form
+    measured = measure(trajectory, final, of="gaze") # torsion does not count
 
-Both define every measure alike; the closed form has no sampling error, the sampled one interpolates
-between samples so that it too is continuous in the command.
+A movement in closed form measures itself (`orient_eye.plants.linear`), by the same definitions.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orient_eye import rotations
+from orient_eye.constants import BAND
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.plants.lpf import LowPassResponse
 from orient_eye.rotations import rotation
 
 Array = NDArray[np.float64]
-BAND = 0.01
-"""Settling band: share of the amplitude around the final orientation (thesis 4.4.2)."""
+View = Literal["orientation", "gaze"]
+"""What is measured: the whole orientation, or the direction of gaze alone."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Measures:
     Attributes:
         final: orientation in which the eye comes to rest, (saccades, 4).
         at_settling: orientation at the settling time, (saccades, 4).
-        amplitude_deg: angle between start and final orientation.
+        amplitude_deg: angle between start and final orientation, or gaze.
         settling_time_s: after it the eye stays within the band around the final orientation: the
             saccade's duration t_d.
         peak_velocity_deg_s: largest speed.
@@ -54,7 +53,9 @@ class Measures:
     failed: NDArray[np.bool_]
 
 
-def measure(trajectory: Trajectory, final: Array | None = None, *, band: float = BAND) -> Measures:
+def measure(
+    trajectory: Trajectory, final: Array | None = None, *, band: float = BAND, of: View = "orientation"
+) -> Measures:
     """Measure sampled saccades.
 
     Args:
@@ -62,6 +63,9 @@ def measure(trajectory: Trajectory, final: Array | None = None, *, band: float =
         final: orientations in which the eye comes to rest, (saccades, 4): the plant's equilibrium at the
             final motor position; None for the last sample.
         band: settling band, share of the amplitude.
+        of: "orientation": amplitude and distance are angles of rotation, overshoot is progress about the axis from
+            start to end. "gaze": they are angles between directions of gaze, and progress along their great circle;
+            speed is that of the gaze.
     """
     q, t = trajectory.orientation, trajectory.time
     final = q[:, -1] if final is None else final
@@ -69,9 +73,8 @@ def measure(trajectory: Trajectory, final: Array | None = None, *, band: float =
     safe = np.where(failed[:, None, None], rotations.FORWARD, q)
     final = np.where(failed[:, None], rotations.FORWARD, final)
 
-    start = safe[:, 0]
-    amplitude = rotations.angle_between(start, final)
-    distance = rotations.angle_between(safe, final[:, None])
+    velocity = np.where(failed[:, None, None], 0.0, trajectory.angular_velocity)
+    amplitude, distance, turned, speed = (_seen_whole if of == "orientation" else _seen_gaze)(safe, final, velocity)
     settling, index, share, settled = _last_exit(t, distance, band * amplitude)
     rows = np.arange(len(safe))
     before, after = safe[rows, index], safe[rows, np.minimum(index + 1, len(t) - 1)]
@@ -79,12 +82,10 @@ def measure(trajectory: Trajectory, final: Array | None = None, *, band: float =
     between = before + share[:, None] * (after - before)  # a millisecond apart: chord and arc agree
     at_settling = between / np.linalg.norm(between, axis=-1, keepdims=True)
 
-    progress = _turn_about(rotation(final) * rotation(start).inv(), start, safe) / np.maximum(amplitude, 1e-9)[:, None]
-    peak, _ = _parabolic_peak(t, progress)
-    speed = np.linalg.norm(np.where(failed[:, None, None], 0.0, trajectory.angular_velocity), axis=-1)
+    peak, _ = _parabolic_peak(t, turned / np.maximum(amplitude, 1e-9)[:, None])
     peak_speed, peak_time = _parabolic_peak(t, speed)
     moved = amplitude > 1e-9
-    return _measures(
+    return finished(
         final=final,
         at_settling=at_settling,
         amplitude_deg=amplitude,
@@ -95,6 +96,76 @@ def measure(trajectory: Trajectory, final: Array | None = None, *, band: float =
         settled=settled | ~moved,
         failed=failed,
     )
+
+
+def measure_angle(
+    time: Array, angle: Array, rate: Array, final: Array, axis: str, failed: NDArray[np.bool_], *, band: float = BAND
+) -> Measures:
+    """Measure sampled saccades of an eye that turns about one axis only; as `measure`, at a fraction of its work.
+
+    Args:
+        time: [s], (time,).
+        angle: about the axis [deg], (saccades, time).
+        rate: [deg/s], (saccades, time).
+        final: where the eye comes to rest [deg], (saccades,).
+        axis: yaw, pitch or roll.
+        failed: which have no numbers, (saccades,).
+        band: settling band, share of the amplitude.
+    """
+    angle, rate = (np.where(failed[:, None], 0.0, values) for values in (angle, rate))
+    final = np.where(failed, 0.0, final)
+    way = final - angle[:, 0]
+    amplitude = np.abs(way)
+    settling, index, share, settled = _last_exit(time, np.abs(angle - final[:, None]), band * amplitude)
+    rows = np.arange(len(angle))
+    before, after = angle[rows, index], angle[rows, np.minimum(index + 1, len(time) - 1)]
+    progress = (angle - angle[:, :1]) * (np.sign(way) / np.maximum(amplitude, 1e-9))[:, None]
+    peak, _ = _parabolic_peak(time, progress)
+    peak_speed, peak_time = _parabolic_peak(time, np.abs(rate))
+    moved = amplitude > 1e-9
+    return finished(
+        final=rotations.about(axis, final),
+        at_settling=rotations.about(axis, before + share * (after - before)),
+        amplitude_deg=amplitude,
+        settling_time_s=np.where(moved, settling, 0.0),
+        peak_velocity_deg_s=peak_speed,
+        overshoot=np.where(moved, np.maximum(peak - 1, 0), 0.0),
+        peak_time=peak_time,
+        settled=settled | ~moved,
+        failed=failed,
+    )
+
+
+def merged(which: NDArray[np.bool_], some: Measures, others: Measures) -> Measures:
+    """Measures of a batch, of which some saccades (saccades,) were measured apart from the others."""
+    fields = {}
+    for name in Measures.__dataclass_fields__:
+        one, other = getattr(some, name), getattr(others, name)
+        fields[name] = np.empty((len(which), *one.shape[1:]), one.dtype)
+        fields[name][which], fields[name][~which] = one, other
+    return Measures(**fields)
+
+
+def _seen_whole(orientation: Array, final: Array, velocity: Array) -> tuple[Array, Array, Array, Array]:
+    """Amplitude (saccades,), and over time distance from the end, turn from the start [deg], and speed [deg/s]."""
+    start = orientation[:, 0]
+    turned = _turn_about(rotation(final) * rotation(start).inv(), start, orientation)
+    distance = rotations.angle_between(orientation, final[:, None])
+    return rotations.angle_between(start, final), distance, turned, np.linalg.norm(velocity, axis=-1)
+
+
+def _seen_gaze(orientation: Array, final: Array, velocity: Array) -> tuple[Array, Array, Array, Array]:
+    """The same of the direction of gaze."""
+    gaze, end = rotations.gaze(orientation), rotations.gaze(final)
+    start = gaze[:, 0]
+    amplitude, distance = (
+        rotations.angle_between_directions(start, end),
+        rotations.angle_between_directions(gaze, end[:, None]),
+    )
+    ahead = end - (end * start).sum(axis=-1, keepdims=True) * start  # along the great circle, where it leaves the start
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-300)
+    turned = np.rad2deg(np.arctan2(np.einsum("ntk,nk->nt", gaze, ahead), np.einsum("ntk,nk->nt", gaze, start)))
+    return amplitude, distance, turned, np.linalg.norm(np.cross(velocity, gaze), axis=-1)
 
 
 def _turn_about(turn: Rotation, start: Array, orientation: Array) -> Array:
@@ -110,7 +181,7 @@ def _turn_about(turn: Rotation, start: Array, orientation: Array) -> Array:
     return angle
 
 
-def _measures(
+def finished(
     *,
     settling_time_s: Array,
     peak_time: Array,
@@ -118,6 +189,7 @@ def _measures(
     settled: NDArray[np.bool_],
     **fields: Array,
 ) -> Measures:
+    """Measures with the skewness that follows from the others, and NaN where a saccade failed."""
     with np.errstate(invalid="ignore", divide="ignore"):
         skewness = np.maximum(settling_time_s - peak_time, 0) / settling_time_s
     fields = {**fields, "settling_time_s": settling_time_s, "skewness": skewness}
@@ -156,85 +228,3 @@ def _parabolic_peak(t: Array, values: Array) -> tuple[Array, Array]:
     value = np.where(usable, middle - 0.25 * (left - right) * shift, values[rows, top])
     step = t[1] - t[0] if len(t) > 1 else 0.0
     return value, t[top] + shift * step
-
-
-_GRID = 128  # points in time on which the roots of the closed form are bracketed
-_ROUNDS = 8  # of safeguarded Newton
-
-
-def measure_response(response: LowPassResponse, *, band: float = BAND) -> Measures:
-    """Measure the low-pass plant's response to pulse-steps, in closed form.
-
-    Settling time, peak velocity and overshoot are roots of the closed form and its derivatives,
-    bracketed on a grid and solved by Newton's method.
-
-    Args:
-        response: of the low-pass plant.
-        band: settling band, share of the amplitude.
-    """
-    slowest = np.minimum(response.command.B[:, 0], response.surrogate.w0)
-    t = (25 / slowest)[:, None] * np.linspace(0, 1, _GRID) ** 3  # past exp(-25) nothing matters
-    progress, rate = response.motion(t)[:2]
-    rows, end = np.arange(len(t)), _GRID - 1
-
-    # In columns: the peak velocity, the peak of an overshoot, the last exit from the band.
-    fastest, top = np.abs(rate).argmax(axis=1), progress.argmax(axis=1)
-    turns = (progress[rows, top] > 1) & (top < end)
-    outside = np.abs(progress - 1) > band
-    last = end - outside[:, ::-1].argmax(axis=1)
-    index = np.stack([fastest, top, last], axis=1)
-    low = t[rows[:, None], np.maximum(index - [1, 1, 0], 0)]
-    high = t[rows[:, None], np.minimum(index + 1, end)]
-    side = np.where(progress[rows, last] > 1, 1.0, -1.0)
-    ahead = np.sign(rate[rows, fastest])
-
-    def function_and_slope(s: Array) -> tuple[Array, Array]:
-        x, x1, x2, x3 = response.motion(s)
-        exit_ = side * (x[:, 2] - 1) - band
-        slope = [ahead * x3[:, 0], x2[:, 1], side * x1[:, 2]]
-        return np.stack([ahead * x2[:, 0], x1[:, 1], exit_], axis=1), np.stack(slope, axis=1)
-
-    root = _falling_root(low, high, function_and_slope)
-    # A crest that leaves the band between two points of the grid: the last exit is behind it.
-    crest = response.motion(root)[0][:, 1]
-    late = turns & (crest > 1 + band) & (root[:, 2] < root[:, 1])
-    if late.any():
-        side = np.where(late, 1.0, side)
-        low[:, 2] = np.where(late, root[:, 1], low[:, 2])
-        high[:, 2] = np.where(late, t[rows, np.minimum(top + 1, end)], high[:, 2])
-        root = np.where(late[:, None], _falling_root(low, high, function_and_slope), root)
-    root[:, 0] = np.where(fastest == 0, 0.0, root[:, 0])
-    at_root, speed_at_root = response.motion(root)[:2]
-    overshoot = np.where(turns, np.maximum(at_root[:, 1] - 1, 0), 0.0)
-
-    size = response.final - response.start
-    moved = size != 0
-    settling = np.where(moved, root[:, 2], 0.0)
-    yaw = response.start + size * np.where(moved, at_root[:, 2], 0.0)
-    failed = ~(np.isfinite(yaw) & np.isfinite(response.final) & np.isfinite(settling))
-    return _measures(
-        final=rotations.from_yaw(response.final),
-        at_settling=rotations.from_yaw(yaw),
-        amplitude_deg=np.abs(size),
-        settling_time_s=settling,
-        peak_velocity_deg_s=np.abs(size * speed_at_root[:, 0]),
-        overshoot=np.where(moved, overshoot, 0.0),
-        peak_time=root[:, 0],
-        settled=np.ones(len(t), bool),
-        failed=failed,
-    )
-
-
-def _falling_root(low: Array, high: Array, f: Callable[[Array], tuple[Array, Array]]) -> Array:
-    """Roots of f, which falls from positive at low to negative at high; all arrays alike.
-
-    Newton's method; a step that would leave the bracket halves it instead.
-    """
-    x = 0.5 * (low + high)
-    for _ in range(_ROUNDS):
-        value, slope = f(x)
-        low, high = np.where(value > 0, x, low), np.where(value > 0, high, x)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x = x - value / slope
-        x = np.where((x >= low) & (x <= high), x, 0.5 * (low + high))
-    return x

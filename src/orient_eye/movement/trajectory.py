@@ -1,6 +1,6 @@
 """What a plant returns: a batch of saccades over time, and its files.
 
-    trajectory = plant.simulate(command)            # command (saccades, time, motors) [deg]
+    trajectory = plant.move(command).trajectory()   # command (saccades, time, motors) [deg]
     trajectory.yaw_deg                              # (saccades, time)
     trajectory.save_npz("saccades.npz"); trajectory[3].to_csv("fourth.csv")
 
@@ -10,7 +10,7 @@ The .npz is the durable record: arrays named as the attributes, and nothing that
 import zipfile
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +20,9 @@ from numpy.typing import NDArray
 from orient_eye import rotations
 from orient_eye.errors import InputError
 from orient_eye.files import write_atomically
+from orient_eye.motor import Motor, names
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class EyeState:
-    """Where saccades start.
-
-    Attributes:
-        orientation: unit quaternion w, x, y, z, (saccades, 4).
-        angular_velocity: head frame [deg/s], (saccades, 3); None for an eye at rest.
-    """
-
-    orientation: Array
-    angular_velocity: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -45,21 +33,23 @@ class Trajectory:
         time: [s], (time,), from 0.
         orientation: unit quaternion w, x, y, z, eye to head, (saccades, time, 4).
         angular_velocity: head frame [deg/s], (saccades, time, 3).
-        motor: motor positions [deg], (saccades, time, motors).
+        command: where the motors were told to be, in their units, (saccades, time, motors).
+        motor: where they were, (saccades, time, motors).
         tension: of the elastics [N], (saccades, time, tendons); None where the plant has none.
         failed: (saccades,), True where the simulation diverged or its command was not finite. All
             numbers of such a saccade are NaN; the others are not touched by it.
-        motor_names: (motors,).
+        motors: what moved the eye, (motors,).
         tendon_names: (tendons,).
     """
 
     time: Array
     orientation: Array
     angular_velocity: Array
+    command: Array
     motor: Array
     tension: Array | None
     failed: NDArray[np.bool_]
-    motor_names: tuple[str, ...]
+    motors: tuple[Motor, ...]
     tendon_names: tuple[str, ...] = ()
 
     def __len__(self) -> int:
@@ -69,16 +59,14 @@ class Trajectory:
         """Some of the saccades, still as a batch: an integer gives a batch of one."""
         if isinstance(which, (int, np.integer)):
             which = np.array([which])
-        return Trajectory(
-            self.time,
-            self.orientation[which],
-            self.angular_velocity[which],
-            self.motor[which],
-            None if self.tension is None else self.tension[which],
-            self.failed[which],
-            self.motor_names,
-            self.tendon_names,
-        )
+        arrays = {name: getattr(self, name) for name in _ROWS}
+        chosen: dict[str, Any] = {name: None if a is None else a[which] for name, a in arrays.items()}
+        return replace(self, **chosen)
+
+    @property
+    def motor_names(self) -> tuple[str, ...]:
+        """Of the motors, (motors,)."""
+        return names(self.motors)
 
     @property
     def yaw_deg(self) -> Array:
@@ -96,8 +84,9 @@ class Trajectory:
         return rotations.to_euler(self.orientation)[2]
 
     def save_npz(self, path: str | Path) -> Path:
-        """Write all arrays to an .npz file that opens without pickle."""
-        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        """Write all arrays to an .npz file that opens without pickle: of the motors, names and units."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "motors"}
+        arrays |= {"motor_names": [m.name for m in self.motors], "motor_units": [m.unit for m in self.motors]}
         if self.tension is None:
             del arrays["tension"]
 
@@ -117,8 +106,10 @@ class Trajectory:
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays: dict[str, Any] = dict(file)
-            names: dict[str, Any] = {k: tuple(map(str, arrays.pop(k))) for k in ("motor_names", "tendon_names")}
-            return cls(tension=arrays.pop("tension", None), **arrays, **names)
+            tendons = tuple(map(str, arrays.pop("tendon_names")))
+            described = zip(arrays.pop("motor_names"), arrays.pop("motor_units"), strict=True)
+            motors = tuple(Motor(str(name), str(unit)) for name, unit in described)
+            return cls(tension=arrays.pop("tension", None), **arrays, motors=motors, tendon_names=tendons)
         except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path} is not a trajectory file (.npz written by orient-eye): {error}") from error
 
@@ -126,7 +117,8 @@ class Trajectory:
         """Write a batch of one as a table, one row a sample.
 
         Columns: t_s; q_w, q_x, q_y, q_z; yaw_deg, pitch_deg, roll_deg; omega_x_deg_s, omega_y_deg_s,
-        omega_z_deg_s; tau1_deg ... (motor positions); tension_NAME_N ... (where there are tendons).
+        omega_z_deg_s; tau1_deg ... (motor positions); command_tau1_deg ... (where they were told to be);
+        tension_NAME_N ... (where there are tendons).
 
         Raises:
             InputError: the batch holds more than one saccade.
@@ -135,9 +127,10 @@ class Trajectory:
             raise InputError(f"a CSV holds one saccade, this trajectory has {len(self)}; pick one: trajectory[0]")
         columns = ["t_s", "q_w", "q_x", "q_y", "q_z", "yaw_deg", "pitch_deg", "roll_deg"]
         columns += [f"omega_{axis}_deg_s" for axis in "xyz"]
-        columns += [motor_column(name) for name in self.motor_names]
+        columns += [f"{prefix}{motor.column}" for prefix in ("", "command_") for motor in self.motors]
         euler = [angle[0] for angle in rotations.to_euler(self.orientation)]
         data = [self.time, *self.orientation[0].T, *euler, *self.angular_velocity[0].T, *self.motor[0].T]
+        data += [*self.command[0].T]
         if self.tension is not None:
             columns += [f"tension_{name}_N" for name in self.tendon_names]
             data += [*self.tension[0].T]
@@ -149,9 +142,7 @@ class Trajectory:
         )
 
 
-def motor_column(motor: str) -> str:
-    """Name of a motor's column in tables: tau2_deg for motor2."""
-    return f"tau{motor.removeprefix('motor')}_deg"
+_ROWS = ("orientation", "angular_velocity", "command", "motor", "tension", "failed")
 
 
 def concatenate(parts: Sequence[Trajectory]) -> Trajectory:
@@ -165,14 +156,6 @@ def concatenate(parts: Sequence[Trajectory]) -> Trajectory:
         same = (part.motor_names, part.tendon_names) == (first.motor_names, first.tendon_names)
         if not same or not np.array_equal(part.time, first.time) or (part.tension is None) != (first.tension is None):
             raise InputError("only trajectories of the same plant and the same times can be one batch")
-    tension = None if first.tension is None else np.concatenate([p.tension for p in parts if p.tension is not None])
-    return Trajectory(
-        first.time,
-        np.concatenate([p.orientation for p in parts]),
-        np.concatenate([p.angular_velocity for p in parts]),
-        np.concatenate([p.motor for p in parts]),
-        tension,
-        np.concatenate([p.failed for p in parts]),
-        first.motor_names,
-        first.tendon_names,
-    )
+    arrays = {name: [getattr(part, name) for part in parts] for name in _ROWS}
+    joined: dict[str, Any] = {k: None if a[0] is None else np.concatenate(a) for k, a in arrays.items()}
+    return replace(first, **joined)

@@ -1,70 +1,130 @@
 """Plants: what a motor command does to the eye.
 
-    plant = make_plant("mujoco")                     # or "lpf", "tavares"
-    trajectory = plant.simulate(command)             # command (saccades, time, motors) [deg]
+    plant = make_plant("mujoco")                     # or "lpf", "tavares": `PLANTS`
+    movement = plant.move(command)                   # a command, or positions (saccades, time, motors) [deg]
+    movement.measure(); movement.trajectory()
 
-Every plant is a `Plant`; the name picks it from `PLANTS`. To add one, write a class with these
-members and put it in that table: environment, trainer, sysid and command line then know it.
+Every plant is a `Plant`; the name picks its kind from `PLANTS`. To add one: a class with the members of
+`Plant` (`simulated.SimulatedPlant` has most of them for a plant that is stepped through time) and a
+`PlantKind` in that table, or in the entry points `orient_eye.plants` of a package of your own. Environment,
+trainer, sysid and command line then know it, and nothing outside its file asks what kind it is.
 """
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from orient_eye.errors import InputError
-from orient_eye.movement.trajectory import EyeState, Trajectory
+from orient_eye.eyes import EYES
+from orient_eye.registry import Registry, load
 
-Array = NDArray[np.float64]
-ELASTIC_ACTION_RANGE_DEG = 40.0
-"""Where a policy may end a saccade of the elastic eye: 61.8 deg of yaw. The straight tendons run inside
-the eyeball already at small angles, and past about 50 deg of motor the response bends over; targets
-within 35 deg of yaw need 23.5."""
+if TYPE_CHECKING:  # names and options are listed without the libraries that compute
+    import mujoco
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from orient_eye.motor import Motor
+    from orient_eye.movement import Movement
+    from orient_eye.state import State
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How many saccades are worth performing on a plant, where nobody says.
+
+    Attributes:
+        saccades_per_update: of a network that learns: about as long as the update itself takes.
+        evaluation_pairs: held against the searched optimum.
+    """
+
+    saccades_per_update: int
+    evaluation_pairs: int
+
+
+@dataclass(frozen=True)
+class PulseRates:
+    """Bounds of B and k0 [1/s] in which the best pulse-steps of a plant lie; on a logarithmic scale."""
+
+    B: tuple[float, float]
+    k0: tuple[float, float]
+
+    @classmethod
+    def around(cls, rates: Sequence[float]) -> PulseRates:
+        """Of a plant whose poles have these sizes [1/s].
+
+        A motor at its speed limit makes a B of many times the poles and a k0 of a tenth of them the best (the pulse
+        saturates the motor); an eye that swings wants a B and a k0 near them.
+        """
+        slowest, fastest = min(rates), max(rates)
+        return cls((0.4 * slowest, 25 * fastest), (0.05 * slowest, 3 * fastest))
+
+
+SIMULATED = Pace(32, 60)
+CLOSED_FORM = Pace(128, 300)
 
 
 @runtime_checkable
 class Plant(Protocol):
-    """From a batch of start states and motor commands to a trajectory.
+    """From a batch of motor commands to movements of the eye. Safe to use from several threads at once.
 
     Attributes:
         name: key in `PLANTS`.
-        motors: names, (motors,).
-        step_s: interval between the samples of commands and trajectories [s].
-        motor_range_deg: mechanical range, (motors, 2) [deg]; commands outside are refused.
-        action_range_deg: where a policy may end a saccade (D of the pulse-step), (motors, 2) [deg].
+        motors: what moves the eye, (motors,).
+        step_s: interval between the samples of its trajectories [s].
+        horizon_s: how long a saccade has to last so that it can be measured; None where it needs no horizon.
+        pace: how many saccades are worth performing on it.
+        slow_pole: the pole [1/s] that k0 can cancel (thesis 4.2), on a plant that is linear and has one such; None
+            where what k0 should be has to be found.
+        pulse_rates: bounds of B and of k0 [1/s] that hold the best pulse-steps, where the thesis' (18 to 80, 5 to 40)
+            do not; None where they do.
     """
 
     name: str
-    motors: tuple[str, ...]
+    motors: tuple[Motor, ...]
     step_s: float
-    motor_range_deg: Array
-    action_range_deg: Array
+    horizon_s: float | None
+    pace: Pace
+    slow_pole: float | None
+    pulse_rates: PulseRates | None
 
-    def simulate(self, command: Array, start: EyeState | None = None) -> Trajectory:
-        """Run a batch of saccades.
+    def move(
+        self,
+        command: Any,
+        start: State | None = None,
+        horizon_s: float | None = None,
+        random: np.random.Generator | None = None,
+    ) -> Movement:
+        """Perform a batch of saccades.
 
         Args:
-            command: motor positions [deg], (saccades, time, motors), row k at time k * step_s.
-            start: state at time 0; None for the equilibrium of the first row of the command.
+            command: an `orient_eye.commands.Command` of all motors, or positions (saccades, time, motors) in their
+                units, row k at time k * step_s.
+            start: state at time 0; None for rest at the command's beginning.
+            horizon_s: how long; None for as long as the command says something, or the plant's own horizon.
+            random: of a plant that is noisy; the others need none.
 
         Returns:
-            The trajectory at the same times. A saccade that diverged is marked failed and is NaN.
+            The movement. A saccade that diverged, or whose command is not finite, is marked failed and is NaN; the
+            others are not touched by it.
 
         Raises:
-            InputError: wrong shape, or a command outside the mechanical range.
+            InputError: wrong shape, or a written command outside the mechanical range.
         """
         ...
 
-    def rest_orientation(self, motor: Array) -> Array:
-        """Orientations (saccades, 4) in which the eye rests at motor positions [deg] (saccades, motors)."""
+    def rest(self, motor: Array) -> Array:
+        """Orientations (saccades, 4) in which the eye rests at motor positions (saccades, motors)."""
         ...
 
-    def rest_motor(self, orientation: Array, driven: tuple[str, ...]) -> Array:
-        """Motor positions [deg] (saccades, motors) at which the eye rests in these orientations.
+    def hold(self, orientation: Array, driven: tuple[str, ...]) -> Array:
+        """Positions (saccades, motors) at which the eye rests in these orientations (saccades, 4).
 
-        Only the driven motors move, the others stand at 0; the inverse of `rest_orientation`.
+        Only the driven motors move, the others stand at 0; the inverse of `rest`.
 
         Raises:
             InputError: an orientation that the driven motors cannot hold.
@@ -72,30 +132,81 @@ class Plant(Protocol):
         ...
 
     def identity(self) -> dict[str, Any]:
-        """What makes this plant this one, for manifests: name, options, hash of the model."""
+        """What makes this plant this one, in plain values: `plant`, its name, and what its kind restores it from."""
+        ...
+
+    def drawn(self) -> mujoco.MjModel:
+        """The eye that recordings draw, with its shapes (`orient_eye.eyes.model.build_model`)."""
         ...
 
 
-def _mujoco(**options: Any) -> Plant:
-    from orient_eye.plants.mujoco import MujocoPlant
+@dataclass(frozen=True)
+class Option:
+    """A keyword of a plant, for the command line.
 
-    return MujocoPlant(**options)
+    Attributes:
+        name: of the keyword; the option is the same with dashes.
+        type: bool, int, float or str.
+        default: what the plant takes it to be.
+        help: for people.
+    """
+
+    name: str
+    type: Any
+    default: Any
+    help: str
 
 
-def _lpf(**options: Any) -> Plant:
-    from orient_eye.plants.lpf import LowPassPlant
+@dataclass(frozen=True)
+class PlantKind:
+    """An entry of `PLANTS`.
 
-    return LowPassPlant(**options)
+    Attributes:
+        summary: what it is, for people.
+        make: from the options, as keywords, to the plant; or where that stands, as "module:attribute".
+        options: what can be chosen on the command line.
+        restore: from `Plant.identity` to the plant; None where that is `make` with all but `plant` and `model`.
+    """
+
+    summary: str
+    make: Callable[..., Plant] | str
+    options: tuple[Option, ...] = ()
+    restore: Callable[[dict[str, Any]], Plant] | str | None = None
 
 
-def _tavares(**options: Any) -> Plant:
-    from orient_eye.plants.tavares import TavaresPlant
+_EYE = Option("eye", str, "thesis", f"Preset of the eye ({', '.join(EYES)}), or an MJCF file of the same form.")
+_GRAVITY = Option("gravity", bool, False, "With the gravity torque.")
 
-    return TavaresPlant(**options)
-
-
-PLANTS: dict[str, Callable[..., Plant]] = {"mujoco": _mujoco, "lpf": _lpf, "tavares": _tavares}
-"""Name to plant. Each entry takes the options of its class as keywords."""
+PLANTS: Registry[PlantKind] = Registry(
+    "plant",
+    {
+        "lpf": PlantKind(
+            "the low-pass surrogate",
+            "orient_eye.plants.linear:LinearPlant",
+            (Option("surrogate", str, "thesis", "A surrogate.json written by sysid, or the name of a shipped one."),),
+            restore="orient_eye.plants.linear:restore",
+        ),
+        "mujoco": PlantKind(
+            "the whole eye in MuJoCo",
+            "orient_eye.plants.mujoco:MujocoPlant",
+            (
+                _EYE,
+                Option("accurate", bool, False, "Integrate at 0.2 ms instead of the thesis' 1 ms."),
+                _GRAVITY,
+            ),
+        ),
+        "tavares": PlantKind(
+            "the thesis' simulator in NumPy, an independent reference",
+            "orient_eye.plants.tavares:TavaresPlant",
+            (
+                _EYE,
+                _GRAVITY,
+                Option("as_published", bool, False, "The author's program to the letter."),
+            ),
+        ),
+    },
+)
+"""Name to kind of plant."""
 
 
 def make_plant(name: str, **options: Any) -> Plant:
@@ -103,94 +214,37 @@ def make_plant(name: str, **options: Any) -> Plant:
 
     Args:
         name: one of `PLANTS`.
-        options: the keywords of its class: `MujocoPlant`, `LowPassPlant`, `TavaresPlant`.
+        options: keywords of its class; those on the command line are in its `PlantKind.options`.
 
     Raises:
-        InputError: unknown name.
+        InputError: unknown name or option.
     """
-    if name not in PLANTS:
-        raise InputError(f"unknown plant {name!r}; choose one of {', '.join(PLANTS)}")
-    return PLANTS[name](**options)
+    kind = PLANTS[name]
+    return _made(name, load(kind.make) if isinstance(kind.make, str) else kind.make, options)
 
 
-def chosen_plant(name: str, surrogate: str | Path, eye: str) -> Plant:
-    """The plant that the options --plant, --surrogate and --eye choose.
-
-    Args:
-        name: one of `PLANTS`.
-        surrogate: for lpf: a file, or the name of a shipped one.
-        eye: for the others: preset of the eye.
+def restore_plant(identity: dict[str, Any]) -> Plant:
+    """The plant of an identity, as `Plant.identity` gives it.
 
     Raises:
-        InputError: unknown, or an option that does nothing on this plant.
+        InputError: unknown plant, or an identity its kind knows nothing of.
     """
-    option, given = ("--eye", eye) if name == "lpf" else ("--surrogate", surrogate)
-    if given != "thesis":
-        raise InputError(f"{option} does nothing on plant {name!r}; leave it out or choose another plant")
-    return make_plant(name, surrogate=surrogate) if name == "lpf" else make_plant(name, eye=eye)
+    name = str(identity.get("plant"))
+    kind = PLANTS[name]
+    if kind.restore is not None:
+        restore = load(kind.restore) if isinstance(kind.restore, str) else kind.restore
+        return _made(name, restore, {"identity": identity})
+    options = {key: value for key, value in identity.items() if key not in ("plant", "model")}
+    known = [option.name for option in kind.options]
+    if set(options) - set(known):  # an identity can be a stranger's: it chooses options, and nothing else of a class
+        raise InputError(f"plant {name!r} has the options {', '.join(known) or '(none)'}, got {', '.join(options)}")
+    return make_plant(name, **options)
 
 
-def plant_in_words(identity: dict[str, Any]) -> str:
-    """A plant's identity for people: "lpf (K = 1.4758, w0 = 17.5)"."""
-    options = {key: value for key, value in identity.items() if key not in ("plant", "model", "motor")}
-    words = [
-        str(value) if key == "eye" else f"{key} = {value_in_words(value)}"
-        for key, value in options.items()
-        if value is not False
-    ]
-    return f"{identity.get('plant')} ({', '.join(words)})"
-
-
-def value_in_words(value: Any) -> str:
-    """A plain value for people."""
-    if isinstance(value, dict):
-        return ", ".join(f"{key} = {value_in_words(item)}" for key, item in value.items())
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(value_in_words, value)) + "]"
-    return "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def check_command(plant: Plant, command: Any) -> Array:
-    """The command as float64 (saccades, time, motors) inside the plant's mechanical range.
-
-    Rows that are not finite pass: the plant marks such a saccade as failed.
-
-    Raises:
-        InputError: wrong shape, or outside the range.
-    """
-    command = np.asarray(command, dtype=float)
-    if command.ndim != 3 or command.shape[2] != len(plant.motors) or command.shape[1] < 1:
-        raise InputError(
-            f"a command of plant {plant.name!r} has the shape (saccades, time, {len(plant.motors)} motors: "
-            f"{', '.join(plant.motors)}), got {command.shape}"
-        )
-    low, high = plant.motor_range_deg.T
-    tolerance = 1e-9 * np.maximum(abs(low), abs(high))
-    outside = (command < low - tolerance) | (command > high + tolerance)
-    if outside.any():
-        saccade, row, motor = (int(i[0]) for i in outside.nonzero())
-        raise InputError(
-            f"saccade {saccade} sends {plant.motors[motor]} to {command[saccade, row, motor]:.1f} deg at "
-            f"{row * plant.step_s:.3f} s; its mechanical range is {low[motor]:.0f} to {high[motor]:.0f} deg: "
-            "make the command smaller"
-        )
-    return command
-
-
-def check_start(start: EyeState, saccades: int) -> tuple[Array, Array]:
-    """Orientation (saccades, 4), normalised, and angular velocity [deg/s] (saccades, 3) of a start.
-
-    Raises:
-        InputError: shapes that do not fit the command.
-    """
-    orientation = np.asarray(start.orientation, dtype=float)
-    velocity = np.zeros((saccades, 3)) if start.angular_velocity is None else np.asarray(start.angular_velocity, float)
-    if orientation.shape != (saccades, 4) or velocity.shape != (saccades, 3):
-        raise InputError(
-            f"{saccades} saccades need start orientations of shape ({saccades}, 4) and angular velocities of shape "
-            f"({saccades}, 3), got {orientation.shape} and {velocity.shape}"
-        )
-    norm = np.linalg.norm(orientation, axis=-1, keepdims=True)
-    if (norm == 0).any():
-        raise InputError("a start orientation is the zero quaternion; looking straight ahead is (1, 0, 0, 0)")
-    return orientation / norm, velocity
+def _made(name: str, make: Callable[..., Plant], options: dict[str, Any]) -> Plant:
+    try:
+        inspect.signature(make).bind(**options)
+    except TypeError as error:
+        known = ", ".join(option.name for option in PLANTS[name].options) or "none"
+        raise InputError(f"plant {name!r}: {error}; its options are {known}") from error
+    return make(**options)

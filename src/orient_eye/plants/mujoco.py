@@ -6,10 +6,14 @@
 The thesis' integrator takes friction explicitly and holds each row of the command for one step. The
 accurate setting takes friction implicitly and holds the middle of each short step of the straight line
 between rows: against the converged solution that is 20 times nearer (`orient-eye validate`). Results do
-not depend on the number of threads.
+not depend on the number of threads. A plant may be used from several Python threads at once, and in a
+forked child.
 """
 
+import os
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -17,53 +21,56 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from orient_eye import eyes
-from orient_eye.movement.trajectory import EyeState, Trajectory
-from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, check_command, check_start, equilibrium
+from orient_eye.errors import InputError
+from orient_eye.eyes.model import tendon_tension
+from orient_eye.motor import names
+from orient_eye.plants.elastic import ElasticPlant
+from orient_eye.plants.simulated import Run
 from orient_eye.rotations import rotation
+from orient_eye.state import State
 
 Array = NDArray[np.float64]
 _ACCURATE_SUBSTEPS = 5
 _RECORD_BYTES = 8e6  # of one chunk of saccades: stays near the caches, and bounds the memory
 
 
-class MujocoPlant:
-    """The elastic eye of `eye_mjcf/eye3.xml` as a plant; see `orient_eye.plants.Plant`.
+class MujocoPlant(ElasticPlant):
+    """The elastic eye of `eye_mjcf` as a plant; see `orient_eye.plants.Plant`.
 
     Args:
-        eye: preset, one of `orient_eye.eyes.EYES`.
+        eye: preset, one of `orient_eye.eyes.EYES`, or an MJCF file of the same form.
         accurate: integrate at 0.2 ms, friction implicit, instead of the thesis' explicit 1 ms.
         gravity: add the gravity torque (thesis 3.8), off in the thesis' runs.
         threads: of the batch; 0 for one a core.
+
+    Raises:
+        InputError: unknown eye, or a number of threads that is none.
     """
 
     name = "mujoco"
-    step_s = 0.001
 
     def __init__(self, eye: str = "thesis", *, accurate: bool = False, gravity: bool = False, threads: int = 0) -> None:
-        self.options = {"eye": eye, "accurate": accurate, "gravity": gravity}
+        if not isinstance(threads, int) or threads < 0:
+            raise InputError(f"threads are a whole number, 0 for one a core, got {threads!r}")
         self.threads = threads
         self.substeps = _ACCURATE_SUBSTEPS if accurate else 1
-        self.model = eyes.build_model(eye, step_s=self.step_s / self.substeps, gravity=gravity, visual=False)
-        self.motors = eyes.motor_names(self.model)
-        self.motor_range_deg = eyes.motor_range_deg(self.model)
-        self.action_range_deg = np.clip(self.motor_range_deg, -ELASTIC_ACTION_RANGE_DEG, ELASTIC_ACTION_RANGE_DEG)
-        self.tendons = tuple(self.model.tendon(i).name for i in range(self.model.ntendon))
+        options = {"eye": eye, "accurate": accurate, "gravity": gravity}
+        super().__init__(options, step_s=self.step_s / self.substeps, gravity=gravity)
         if accurate:
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
-        self._model_hash = eyes.model_hash(self.model)
         eye_joint = self.model.joint("eye")
         self._eye_qpos = eye_joint.qposadr[0] + np.arange(4)
         self._eye_qvel = eye_joint.dofadr[0] + np.arange(3)
-        hinges = [self.model.joint(self.model.actuator(name).trnid[0]) for name in self.motors]
-        self._motor_qpos = np.array([hinge.qposadr[0] for hinge in hinges])
-        self._motor_ctrl = np.array([self.model.actuator(name).id for name in self.motors])
+        self._motor_ctrl = np.array([self.model.actuator(name).id for name in names(self.motors)])
+        joints = [self.model.joint(self.model.actuator(name).trnid[0]) for name in names(self.motors)]
+        self._motor_qpos = np.array([joint.qposadr[0] for joint in joints])
+        self._per_control = np.deg2rad(1) / self.model.actuator_gear[self._motor_ctrl, 0]  # joint position a deg
         # What is recorded is what the file's sensors measure: MuJoCo's threads then do all the work.
         self._sensed_orientation = self._sensed("orientation")
         self._sensed_velocity = self._sensed("angular_velocity")
         lengths = [self._sensed(f"length_{name}") for name in self.tendons]
         self._sensed_length = np.array([place.start for place in lengths])
-        self._batches: dict[str, Batch] = {}
+        self._pool = _Pool(self.model, threads)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.options, "threads": self.threads}
@@ -71,43 +78,21 @@ class MujocoPlant:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(**state)  # type: ignore[misc]  # models and batches are rebuilt in the process
 
-    def identity(self) -> dict[str, Any]:
-        """Name, options and hash of the compiled model."""
-        return {"plant": self.name, **self.options, "model": self._model_hash}
-
     def _sensed(self, name: str) -> slice:
         """Where a sensor's numbers are in sensordata."""
         sensor = self.model.sensor(name)
         return slice(int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
 
-    def simulate(self, command: Array, start: EyeState | None = None) -> Trajectory:
-        """Run a batch of saccades; see `orient_eye.plants.Plant.simulate`."""
-        command = check_command(self, command)
-        finite = np.asarray(np.isfinite(command).all(axis=(1, 2)))
-        motor = np.where(finite[:, None, None], command, 0.0)
-        if start is None:
-            start = EyeState(self.rest_orientation(motor[:, 0]))
-        orientation, velocity = check_start(start, len(command))
-        finite &= np.isfinite(orientation).all(axis=1) & np.isfinite(velocity).all(axis=1)
-        orientation[~finite], velocity[~finite] = [1, 0, 0, 0], 0
-
-        saccades, samples = command.shape[:2]
-        result = Trajectory(
-            time=np.arange(samples) * np.float64(self.step_s),
-            orientation=np.empty((saccades, samples, 4)),
-            angular_velocity=np.empty((saccades, samples, 3)),
-            motor=motor,
-            tension=np.empty((saccades, samples, len(self.tendons))),
-            failed=~finite,
-            motor_names=self.motors,
-            tendon_names=self.tendons,
-        )
+    def run(self, motor: Array, start: State) -> Run:
+        """See `orient_eye.plants.simulated.SimulatedPlant`."""
+        saccades, samples = motor.shape[:2]
+        orientation, velocity = np.empty((saccades, samples, 4)), np.empty((saccades, samples, 3))
+        tension, diverged = np.empty((saccades, samples, len(self.tendons))), np.zeros(saccades, bool)
         for part in self._chunks(saccades, samples):
-            self._run(part, motor, orientation, velocity, result)
-        for array in (result.orientation, result.angular_velocity, result.motor, result.tension):
-            assert array is not None
-            array[result.failed] = np.nan
-        return result
+            with self._pool.batch("run", part.stop - part.start) as batch:
+                results = orientation[part], velocity[part], tension[part]
+                diverged[part] = self._run(batch, motor[part], start[part], *results)
+        return orientation, velocity, tension, diverged
 
     def _chunks(self, saccades: int, samples: int) -> Iterator[slice]:
         row = 8 * (self.model.nsensordata + self.model.nu)
@@ -115,47 +100,39 @@ class MujocoPlant:
         for first in range(0, saccades, size):
             yield slice(first, min(first + size, saccades))
 
-    def _batch(self, use: str, size: int) -> Batch:
-        """A batch of that size, kept for the next call of the same use."""
-        batch = self._batches.get(use)
-        if batch is None or batch.nsim != size:
-            batch = self._batches[use] = Batch(self.model, size, self.threads)
-        return batch
-
-    def _run(self, part: slice, motor: Array, orientation: Array, velocity: Array, result: Trajectory) -> None:
-        command = np.deg2rad(motor[part])
-        size, samples = command.shape[:2]
-        batch = self._batch("simulate", size)
+    def _run(
+        self, batch: Batch, motor: Array, start: State, orientation: Array, velocity: Array, tension: Array
+    ) -> NDArray[np.bool_]:
+        """Run one batch into the three arrays; returns which saccades diverged."""
+        size, samples = motor.shape[:2]
         # Everything fresh: state, controls, warm start, warnings.
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         batch.warning[:] = 0
-        batch.qpos[:, self._eye_qpos] = orientation[part]
-        batch.qpos[:, self._motor_qpos] = command[:, 0]
-        eye_frame = rotation(orientation[part]).inv().apply(np.deg2rad(velocity[part]))
-        batch.qvel[:, self._eye_qvel] = eye_frame
+        batch.qpos[:, self._eye_qpos] = start.orientation
+        batch.qpos[:, self._motor_qpos] = motor[:, 0] * self._per_control
+        batch.qvel[:, self._eye_qvel] = rotation(start.orientation).inv().apply(np.deg2rad(start.angular_velocity))
 
         steps = (samples - 1) * self.substeps
         before_steps = np.empty((size, 0, self.model.nsensordata))
         if steps:
             # An arm stands where ctrl says one step later, so each step is sent the next instant. Sensors
             # describe the state before a step; the last state is measured afterwards.
-            record = batch.rollout(steps, self._control(command), record=("sensordata",))
+            record = batch.rollout(steps, self._control(np.deg2rad(motor)), record=("sensordata",))
             before_steps = record["sensordata"][:, :: self.substeps]
         last = batch.bind("sensordata")
         diverged = (batch.warning > 0).reshape(size, -1).any(axis=1)
         batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL)
-        assert result.tension is not None
         for output, sensed, convert in (
-            (result.orientation, self._sensed_orientation, lambda x: x),
-            (result.angular_velocity, self._sensed_velocity, np.rad2deg),
-            (result.tension, self._sensed_length, self._tension),
+            (orientation, self._sensed_orientation, lambda x: x),
+            (velocity, self._sensed_velocity, np.rad2deg),
+            (tension, self._sensed_length, self._tension),
         ):
-            output[part, :-1] = convert(before_steps[..., sensed])
-            output[part, -1] = convert(last[:, sensed])
-        result.failed[part] |= diverged | ~np.isfinite(result.orientation[part]).all(axis=(1, 2))
+            output[:, :-1] = convert(before_steps[..., sensed])
+            output[:, -1] = convert(last[:, sensed])
+        return np.asarray(diverged | ~np.isfinite(orientation).all(axis=(1, 2)))
 
     def _tension(self, length: Array) -> Array:
-        return eyes.tendon_tension(self.model, length)
+        return tendon_tension(self.model, length)
 
     def _control(self, command: Array) -> Array:
         """Controls [rad] (saccades, steps, nu) that put the arms on the command."""
@@ -171,20 +148,47 @@ class MujocoPlant:
             control[..., self._motor_ctrl] = (1 - share) * command[:, row] + share * command[:, row + 1]
         return control
 
-    def _torque(self, orientation: Array, motor: Array) -> Array:
-        batch = self._batch("torque", len(orientation))  # nothing but qpos ever changes in this one
-        batch.qpos[:, self._eye_qpos] = orientation
-        batch.qpos[:, self._motor_qpos] = np.deg2rad(motor)
-        passive, actuated = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
-        batch.forward()
-        in_eye_frame = (passive + actuated)[:, self._eye_qvel]
+    def torque(self, orientation: Array, motor: Array) -> Array:
+        """See `orient_eye.plants.elastic.ElasticPlant`."""
+        if not len(orientation):
+            return np.zeros((0, 3))
+        with self._pool.batch("torque", len(orientation)) as batch:  # nothing but qpos ever changes in these
+            batch.qpos[:, self._eye_qpos] = orientation
+            batch.qpos[:, self._motor_qpos] = motor * self._per_control
+            passive, actuated = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
+            batch.forward()
+            in_eye_frame = (passive + actuated)[:, self._eye_qvel]
         return rotation(orientation).apply(in_eye_frame)
 
-    def rest_orientation(self, motor: Array) -> Array:
-        """Orientations in which the eye rests; see `orient_eye.plants.Plant`."""
-        return equilibrium.rest_orientation(self._torque, motor)
 
-    def rest_motor(self, orientation: Array, driven: tuple[str, ...]) -> Array:
-        """Motor positions that hold these orientations; see `orient_eye.plants.Plant`."""
-        index = [self.motors.index(name) for name in driven]
-        return equilibrium.rest_motor(self._torque, orientation, len(self.motors), index, self.motor_range_deg)
+class _Pool:
+    """MuJoCo's batches that are not in use: each caller has one of its own, whatever thread or process it is in."""
+
+    def __init__(self, model: mujoco.MjModel, threads: int) -> None:
+        self._model, self._threads = model, threads
+        self._begin()
+
+    def _begin(self) -> None:
+        self._process, self._lock = os.getpid(), threading.Lock()
+        self._idle: dict[str, list[Batch]] = {}
+
+    @contextmanager
+    def batch(self, use: str, size: int) -> Iterator[Batch]:
+        """A batch of that size, kept for the next call of the same use and size."""
+        if self._process != os.getpid():  # in a forked child the threads of these batches are not there
+            _ABANDONED.append(self._idle)
+            self._begin()
+        with self._lock:
+            idle = self._idle.setdefault(use, [])
+            found = next((i for i, batch in enumerate(idle) if batch.nsim == size), None)
+            batch = None if found is None else idle.pop(found)
+        if batch is None:
+            batch = Batch(self._model, size, self._threads)
+        yield batch
+        with self._lock:  # one that an error stopped is not used again
+            idle.insert(0, batch)
+            del idle[_KEPT:]
+
+
+_KEPT = 2  # idle batches of a use
+_ABANDONED: list[Any] = []  # never freed: that would wait for threads that are not there

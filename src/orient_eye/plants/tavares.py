@@ -6,17 +6,16 @@ a rigid body with viscous friction in four small ways, which the option `as_publ
 them its runs come out to 0.0004 deg (`orient-eye validate`).
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from orient_eye import eyes
-from orient_eye.eyes import STANDARD_GRAVITY, Elastics
-from orient_eye.movement.trajectory import EyeState, Trajectory
-from orient_eye.plants import ELASTIC_ACTION_RANGE_DEG, check_command, check_start, equilibrium
+from orient_eye.eyes.elastics import Elastics
+from orient_eye.eyes.model import STANDARD_GRAVITY
+from orient_eye.plants.elastic import ElasticPlant
+from orient_eye.plants.simulated import Run
 from orient_eye.rotations import FORWARD, rotation
+from orient_eye.state import State
 
 Array = NDArray[np.float64]
 STATIC_FRICTION = 0.006
@@ -26,11 +25,11 @@ STATIC_SPEED = 1e-5
 _DIVERGED = 1e4  # rad/s: a thousand times the fastest saccade
 
 
-class TavaresPlant:
+class TavaresPlant(ElasticPlant):
     """The reference simulator as a plant; see `orient_eye.plants.Plant`.
 
     Args:
-        eye: preset, one of `orient_eye.eyes.EYES`.
+        eye: preset, one of `orient_eye.eyes.EYES`, or an MJCF file of the same form.
         gravity: add the gravity torque (thesis 3.8).
         as_published: the author's program to the letter. The inertia is turned as printed, R^T I R (3.10,
             it should be R I R^T), there is no gyroscopic torque, a step adds a straight piece to the
@@ -39,21 +38,10 @@ class TavaresPlant:
     """
 
     name = "tavares"
-    step_s = 0.001
 
     def __init__(self, eye: str = "thesis", *, gravity: bool = False, as_published: bool = False) -> None:
-        self.options = {"eye": eye, "gravity": gravity, "as_published": as_published}
-        model = eyes.build_model(eye, step_s=self.step_s, visual=False)
-        self.elastics = Elastics.from_model(model)
-        self.motors = eyes.motor_names(model)
-        self.motor_range_deg = eyes.motor_range_deg(model)
-        self.tendons = tuple(model.tendon(i).name for i in range(model.ntendon))
-        self.action_range_deg = np.clip(self.motor_range_deg, -ELASTIC_ACTION_RANGE_DEG, ELASTIC_ACTION_RANGE_DEG)
-        self._model_hash = eyes.model_hash(model)
-
-    def identity(self) -> dict[str, Any]:
-        """Name, options and hash of the model the numbers come from."""
-        return {"plant": self.name, **self.options, "model": self._model_hash}
+        super().__init__({"eye": eye, "gravity": gravity, "as_published": as_published}, step_s=self.step_s)
+        self.elastics = Elastics.from_model(self.model)
 
     def elastic_torque(self, turn: Array, motor: Array) -> tuple[Array, Array]:
         """Torque of the elastics [N m] (n, 3) and their tension [N] (n, tendons); 3.2 to 3.5.
@@ -76,8 +64,8 @@ class TavaresPlant:
         force = (tension / distance)[..., None] * span
         return np.cross(insertion, force).sum(axis=1), tension
 
-    def _torque(self, orientation: Array, motor: Array) -> Array:
-        """All torques on an eye at rest but friction, [N m], (n, 3)."""
+    def torque(self, orientation: Array, motor: Array) -> Array:
+        """See `orient_eye.plants.elastic.ElasticPlant`."""
         turn = rotation(orientation).as_matrix()
         torque, _ = self.elastic_torque(turn, motor)
         return torque + self._gravity_torque(turn)
@@ -88,34 +76,22 @@ class TavaresPlant:
         weight = np.array([0, 0, -self.elastics.mass * STANDARD_GRAVITY])
         return np.cross(turn @ self.elastics.centre_of_mass, weight)
 
-    def simulate(self, command: Array, start: EyeState | None = None) -> Trajectory:
-        """Run a batch of saccades; see `orient_eye.plants.Plant.simulate`."""
-        command = check_command(self, command)
-        finite = np.asarray(np.isfinite(command).all(axis=(1, 2)))
-        motor = np.where(finite[:, None, None], command, 0.0)
-        if start is None:
-            start = EyeState(self.rest_orientation(motor[:, 0]))
-        orientation, velocity = check_start(start, len(command))
-        finite &= np.isfinite(orientation).all(axis=1) & np.isfinite(velocity).all(axis=1)
-        orientation[~finite], velocity[~finite] = FORWARD, 0
-        saccades, samples = command.shape[:2]
+    def run(self, motor: Array, start: State) -> Run:
+        """See `orient_eye.plants.simulated.SimulatedPlant`."""
+        saccades, samples = motor.shape[:2]
         out_q, out_w = np.empty((saccades, samples, 4)), np.empty((saccades, samples, 3))
         out_t = np.empty((saccades, samples, len(self.tendons)))
-        q, omega = orientation, np.deg2rad(velocity)
+        q, omega = start.orientation.copy(), np.deg2rad(start.angular_velocity)
+        diverged = np.zeros(saccades, bool)
         for k in range(samples):
+            gone = ~(np.abs(omega).max(axis=1, initial=0) < _DIVERGED)
+            diverged |= gone
+            q[gone], omega[gone] = FORWARD, 0
             turn = rotation(q).as_matrix()
             torque, tension = self.elastic_torque(turn, motor[:, k])
             out_q[:, k], out_w[:, k], out_t[:, k] = q, np.rad2deg(omega), tension
             q, omega = self._advance(turn, q, omega, torque + self._gravity_torque(turn))
-            gone = ~(np.abs(omega).max(axis=1) < _DIVERGED)
-            finite &= ~gone
-            q[gone], omega[gone] = FORWARD, 0
-        failed = ~finite
-        for array in (out_q, out_w, out_t, motor):
-            array[failed] = np.nan
-        return Trajectory(
-            np.arange(samples) * np.float64(self.step_s), out_q, out_w, motor, out_t, failed, self.motors, self.tendons
-        )
+        return out_q, out_w, out_t, diverged
 
     def _advance(self, turn: Array, q: Array, omega: Array, torque: Array) -> tuple[Array, Array]:
         """One step of Algorithm 2: omega first, then q with the new omega."""
@@ -137,12 +113,3 @@ class TavaresPlant:
         )
         q = q + 0.5 * h * rate
         return q / np.linalg.norm(q, axis=-1, keepdims=True), omega
-
-    def rest_orientation(self, motor: Array) -> Array:
-        """Orientations in which the eye rests; see `orient_eye.plants.Plant`."""
-        return equilibrium.rest_orientation(self._torque, motor)
-
-    def rest_motor(self, orientation: Array, driven: tuple[str, ...]) -> Array:
-        """Motor positions that hold these orientations; see `orient_eye.plants.Plant`."""
-        index = [self.motors.index(name) for name in driven]
-        return equilibrium.rest_motor(self._torque, orientation, len(self.motors), index, self.motor_range_deg)

@@ -4,15 +4,16 @@
     $ orient-eye view saccades.rrd
 
 All saccades start at 0 on the one timeline `sim_time`; each is a branch of the entity tree and a tab of
-the viewer. Everything is drawn from the compiled model. Numbers are the trajectory's own, one row a
+the viewer. Everything is drawn from a compiled model, the plant's own. Numbers are the trajectory's own, one row a
 sample (a constant has two). The durable record is the .npz: Rerun promises the format to its next
 version only.
 
-Entities of a saccade, below /saccades/GROUP/INDEX_TITLE, in deg, deg/s and N:
+Entities of a saccade, below /saccades/GROUP/INDEX_TITLE, in deg, deg/s, N and the motors' units:
     angle/yaw, angle/pitch, angle/roll          orientation; pitch and roll where they move
     angle/target_yaw, ...                       of the target
     velocity/x, velocity/y, velocity/z          angular velocity, head frame; x and y where they move
     motor/NAME                                  motor positions
+    command/NAME                                where motors were told to be, where they were elsewhere
     tension                                     of all tendons of the model
     reference/...                               angle, velocity and motor of the reference
     scene/BODY, scene/tendons, scene/target     3-D, metres, head frame
@@ -22,7 +23,6 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.errors import InputError
-from orient_eye.eyes import build_model
+from orient_eye.eyes.model import ball
 from orient_eye.files import write_atomically
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording.curves import STILL_DEG, Curves
@@ -39,11 +39,6 @@ from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.scene import Scene, slug
 
 Array = NDArray[np.float64]
-
-
-def model_of(identity: dict[str, Any]) -> mujoco.MjModel:
-    """The eye to draw for a plant's identity: its own, or the thesis' where the plant has none."""
-    return build_model(identity.get("eye", "thesis"))
 
 
 def record(
@@ -65,8 +60,7 @@ def record(
         path: the file, NAME.rrd.
         trajectory: the saccades, of any plant. Motors of the model that it lacks stand at 0, and where it
             has no tension the tendons show that of their length.
-        model: the compiled eye to draw, with its shapes: `build_model(NAME)`, where a plant's own model has
-            none; None for the preset "thesis".
+        model: the compiled eye to draw, with its shapes: `plant.drawn()`; None for a ball without motors and tendons.
         target: orientations w, x, y, z, (saccades, 4); `rotations.from_yaw(yaw_deg)` for horizontal ones.
         titles: name of each saccade, (saccades,); None for its start and target, or its number. Saccades of the
             same title have the same colour.
@@ -98,7 +92,7 @@ def record(
     titles = _titles(trajectory, target) if titles is None else titles
     content = _Content(
         trajectory=trajectory,
-        model=build_model() if model is None else model,
+        model=ball() if model is None else model,
         tabs=_tabs(titles, groups),
         target=target,
         reference=reference,
@@ -165,7 +159,8 @@ def _write(file: Path, name: str, content: _Content) -> None:
     rr.set_strict_mode(True)
     try:
         with rr.RecordingStream(application) as rec:
-            rec.save(file, default_blueprint=blueprint(shown, plots, compared, scene))
+            stream = rr.binary_stream(rec)  # to memory: of a file on a full disk the SDK says nothing, or waits
+            rec.send_blueprint(blueprint(shown, plots, compared, scene), make_active=False)
             rec.send_recording_name(name)
             text = _info(content, pitch=curves.largest_deg["pitch"] > 0, tension_top=scene.tension_top)
             rec.log("/info", rr.TextDocument(text, media_type="text/markdown"), static=True)
@@ -178,7 +173,11 @@ def _write(file: Path, name: str, content: _Content) -> None:
                 if reference is not None and not reference.failed[k]:
                     scene.draw_reference(rec, f"{path}/reference", reference.orientation[k], reference.time)
                 curves.draw(rec, tab.root, k, title=tab.title, colour=tab.colour)
-            rec.disconnect()
+            rec.disconnect()  # writes the end, without which the recording is not whole
+            recording = stream.read()
+            if recording is None:
+                raise RuntimeError("the Rerun SDK returned no recording")
+            file.write_bytes(recording)
     finally:
         rr.set_strict_mode(strict)
 
@@ -187,6 +186,8 @@ def _info(content: _Content, *, pitch: bool, tension_top: float) -> str:
     """The text of the panel "info", Markdown."""
     trajectory, target = content.trajectory, content.target
     angles = "yaw, pitch" if pitch else "yaw"
+    scale = f"Tendons: green when slack, else from blue over magenta and orange to yellow at {tension_top:.3g} N."
+    tendons = [scale, ""] if content.model.ntendon else []
     lines = [
         content.notes,
         "",
@@ -195,8 +196,7 @@ def _info(content: _Content, *, pitch: bool, tension_top: float) -> str:
         + (", the grey line and the dark grey curves the reference. " if content.reference is not None else ". ")
         + "Positive yaw is to the left, positive pitch down (head frame: x forward, y left, z up).",
         "",
-        f"Tendons: green when slack, else from blue over magenta and orange to yellow at {tension_top:.3g} N.",
-        "",
+        *tendons,
         f"| saccade | group | target {angles} | final {angles} | peak speed |",
         "|---|---|---|---|---|",
     ]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 TARGET_COLOUR = (165, 165, 170)
+"""Of what was wanted: targets and commands."""
 TENDON_COLOURS: tuple[Colour, ...] = (
     (80, 160, 220), (255, 150, 60), (90, 190, 90), (235, 90, 90), (175, 130, 210),
     (170, 125, 110), (235, 140, 200), (200, 200, 70), (60, 200, 210), (150, 150, 150),
@@ -23,6 +24,7 @@ TENDON_COLOURS: tuple[Colour, ...] = (
 _TURNS = {"yaw": "z", "pitch": "y", "roll": "x"}  # an angle and the axis of its velocity
 STILL_DEG = 0.5
 """Pitch and roll that stay below are left out."""
+_SAME = 1e-6  # of a motor's unit: a command that its motor follows to this is not drawn
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Plot:
 
 
 class Curves:
-    """The curves of a batch of saccades, in deg, deg/s and N.
+    """The curves of a batch of saccades, in deg, deg/s, N and the motors' units.
 
     Args:
         trajectory: the saccades.
@@ -57,6 +59,7 @@ class Curves:
 
     Attributes:
         own: entity path below a saccade's root to values (saccades, time).
+        told: the same of commands, where a motor was told to be elsewhere than it was.
         target: the same of the target, (saccades,).
         reference: the same of the reference, (saccades, its time); its root is the saccade's "reference".
         largest_deg: largest yaw, pitch and roll either way; 0 for those left out.
@@ -81,17 +84,25 @@ class Curves:
         turns = [turn for turn in _TURNS if turn == "yaw" or largest[turn] > STILL_DEG]
         self.largest_deg = {turn: largest[turn] if turn in turns else 0.0 for turn in _TURNS}
         self.own = _curves(trajectory, turns)
+        self._units = {f"motor/{slug(motor.name)}": motor.unit for motor in trajectory.motors}
+        off = np.abs(np.nan_to_num(trajectory.command - trajectory.motor)[drawn]).max(axis=(0, 1), initial=0) > _SAME
+        self.told = {
+            f"command/{slug(motor.name)}": trajectory.command[..., i]
+            for i, motor in enumerate(trajectory.motors)
+            if off[i]
+        }
         self.target = {} if target is None else {f"angle/target_{turn}": _angles(target)[turn] for turn in turns}
         self.reference = {} if reference is None else _curves(reference, turns)
         self._reference_time = np.zeros(0) if reference is None else reference.time
         self._reference_failed = np.zeros(0, bool) if reference is None else reference.failed
 
     def plots(self) -> list[Plot]:
-        """Those beside the eye: angles with their targets, motors, velocity, tension."""
-        moving = self._moving_motors()
+        """Those beside the eye: angles with their targets, motors by unit with their commands, velocity, tension."""
+        angles, moving = self._named("angle"), self._moving_motors()
+        units = dict.fromkeys(self._units[name] for name in moving)
         plots = [
-            self._plot(self._angle_name(*self._named("angle")), [*self._named("angle"), *self.target]),
-            self._plot(", ".join(name.removeprefix("motor/") for name in moving) + " [deg]", moving),
+            self._plot(self._angle_name(*angles), [*angles, *self.target]),
+            *(self._motor_plot([name for name in moving if self._units[name] == unit]) for unit in units),
             self._plot("angular velocity [deg/s]", self._named("velocity")),
         ]
         if self._tendons:
@@ -109,9 +120,10 @@ class Curves:
                     goal = f"angle/target_{what}"
                     series = [curve, *([goal] if goal in self.target else [])]
                     each = self._plot(self._angle_name(curve), series)
+                elif quantity == "motor":
+                    each = self._motor_plot([curve])
                 else:
-                    name = f"{what} [deg]" if quantity == "motor" else f"angular velocity about {what} [deg/s]"
-                    each = self._plot(name, [curve])
+                    each = self._plot(f"angular velocity about {what} [deg/s]", [curve])
                 plots.append(replace(each, shaded=place > 0))
         return plots
 
@@ -120,6 +132,9 @@ class Curves:
         place = {name: i for plot in self.plots() for i, name in enumerate(plot.series)}
         for path, values in self.own.items():
             style = _style(f"{path.split('/')[1]} {title}", shade(colour, place.get(path, 0)), 2)
+            _send(rec, f"{root}/{path}", self._time, values[saccade], style)
+        for path, values in self.told.items():
+            style = _style(f"{path.replace('/', ' ')} {title}", TARGET_COLOUR, 1)
             _send(rec, f"{root}/{path}", self._time, values[saccade], style)
         for path, angle in self.target.items():
             style = _style(f"{path.split('/')[1].replace('_', ' ')} {title}", TARGET_COLOUR, 1)
@@ -138,15 +153,26 @@ class Curves:
 
     def _moving_motors(self) -> list[str]:
         motors = self._named("motor")
-        moving = [name for name in motors if self._drawn and np.ptp(np.nan_to_num(self.own[name][self._drawn])) > 0]
+        moving = [
+            name
+            for name in motors
+            if _command_of(name) in self.told
+            or (self._drawn and np.ptp(np.nan_to_num(self.own[name][self._drawn])) > 0)
+        ]
         return moving or motors
 
     def _angle_name(self, *curves: str) -> str:
         angles = ", ".join(curve.removeprefix("angle/") for curve in curves)
         return f"{angles} [deg]" + (", target grey" if self.target else "")
 
+    def _motor_plot(self, motors: Sequence[str]) -> Plot:
+        """Of motors of one unit."""
+        told = [command for command in map(_command_of, motors) if command in self.told]
+        name = ", ".join(motor.removeprefix("motor/") for motor in motors) + f" [{self._units[motors[0]]}]"
+        return self._plot(name + (", command grey" if told else ""), [*motors, *told])
+
     def _plot(self, name: str, series: Sequence[str]) -> Plot:
-        sources = (self.own, self.target, self.reference)
+        sources = (self.own, self.told, self.target, self.reference)
         values = [np.nan_to_num(curves[each][self._drawn]) for curves in sources for each in series if each in curves]
         span = float(min(v.min(initial=0) for v in values)), float(max(v.max(initial=0) for v in values))
         return Plot(name, tuple(series), span, legend=sum(each in self.own for each in series) > 1)
@@ -157,6 +183,11 @@ def shade(colour: Colour, place: int) -> Colour:
     toward, share = ((0, 0.0), (255, 0.6), (0, 0.45), (255, 0.8), (0, 0.65))[place % 5]
     r, g, b = (round((1 - share) * c + share * toward) for c in colour)
     return r, g, b
+
+
+def _command_of(motor: str) -> str:
+    """Entity path of a motor's command."""
+    return "command/" + motor.removeprefix("motor/")
 
 
 def _angles(orientation: Array) -> dict[str, Array]:

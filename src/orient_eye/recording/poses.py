@@ -11,8 +11,9 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from orient_eye import eyes
 from orient_eye.errors import InputError
+from orient_eye.eyes.model import motors, tendon_tension
+from orient_eye.motor import names
 from orient_eye.movement.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -67,22 +68,26 @@ class Poses:
 
 
 def pose(model: mujoco.MjModel, trajectory: Trajectory) -> Poses:
-    """Poses of all bodies and tendons; motors that it does not have, or not know (NaN), stand at 0.
+    """Poses of all bodies and tendons; motors that the trajectory does not have, or not know (NaN), stand at 0.
+
+    A model without motors shows only how the eye turns.
 
     The tension is the trajectory's own where it names the model's tendons, else that of the elastics
     at their length in this pose.
 
     Raises:
-        InputError: the model has no ball joint "eye", or lacks a motor of the trajectory.
+        InputError: the model has no ball joint "eye", or it has motors and lacks one of the trajectory's.
     """
-    unknown = [name for name in trajectory.motor_names if name not in _names(model, "actuator")]
-    if unknown:
+    own = names(motors(model))
+    unknown = [name for name in trajectory.motor_names if name not in own]
+    if own and unknown:
         raise InputError(
-            f"the trajectory moves {', '.join(unknown)}, the model to draw has the motors "
-            f"{', '.join(eyes.motor_names(model))}: pass the eye of the trajectory's plant, build_model(NAME)"
+            f"the trajectory moves {', '.join(unknown)}, the model to draw has the motors {', '.join(own)}: pass the "
+            "eye of the trajectory's plant, plant.drawn()"
         )
-    if "eye" not in _names(model, "joint"):
-        raise InputError(f'the model to draw needs a ball joint "eye", it has {", ".join(_names(model, "joint"))}')
+    joints = [model.joint(i).name for i in range(model.njnt)]
+    if "eye" not in joints:
+        raise InputError(f'the model to draw needs a ball joint "eye", it has {", ".join(joints)}')
     batch = Batch(model, trajectory.orientation[..., 0].size)
     fields = ("xpos", "xquat", "ten_length", "wrap_xpos", "wrap_obj", "ten_wrapadr", "ten_wrapnum")
     bound = {name: batch.bind(name) for name in fields}
@@ -91,15 +96,16 @@ def pose(model: mujoco.MjModel, trajectory: Trajectory) -> Poses:
     eye = int(model.joint("eye").qposadr[0]) + np.arange(4)
     batch.qpos[np.ix_(ok, eye)] = trajectory.orientation.reshape(-1, 4)[ok]
     for i, name in enumerate(trajectory.motor_names):
-        if name in eyes.motor_names(model):
-            hinge = model.joint(model.actuator(name).trnid[0])
-            batch.qpos[ok, hinge.qposadr[0]] = np.deg2rad(np.nan_to_num(trajectory.motor[..., i])).ravel()[ok]
+        if name in own:
+            joint, gear = model.joint(model.actuator(name).trnid[0]), float(model.actuator(name).gear[0])
+            angle = np.deg2rad(np.nan_to_num(trajectory.motor[..., i])) / gear
+            batch.qpos[ok, joint.qposadr[0]] = angle.ravel()[ok]
     batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
 
     def shaped(name: str, *shape: int) -> Any:
         return bound[name].reshape(*trajectory.orientation.shape[:2], *shape)
 
-    tension = eyes.tendon_tension(model, shaped("ten_length", model.ntendon))
+    tension = tendon_tension(model, shaped("ten_length", model.ntendon))
     if trajectory.tension is not None and set(tendon_names(model)) <= set(trajectory.tendon_names):
         tension = trajectory.tension[..., [trajectory.tendon_names.index(name) for name in tendon_names(model)]]
     return Poses(
@@ -111,11 +117,6 @@ def pose(model: mujoco.MjModel, trajectory: Trajectory) -> Poses:
         path_start=shaped("ten_wrapadr", model.ntendon),
         path_count=shaped("ten_wrapnum", model.ntendon),
     )
-
-
-def _names(model: mujoco.MjModel, kind: str) -> list[str]:
-    count = {"actuator": model.nu, "joint": model.njnt}[kind]
-    return [getattr(model, kind)(i).name for i in range(count)]
 
 
 def tendon_names(model: mujoco.MjModel) -> tuple[str, ...]:

@@ -1,0 +1,1 @@
+"""The best action for a saccade: searched (`optimum`), searched again by another program, and remembered."""

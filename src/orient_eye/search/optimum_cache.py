@@ -9,6 +9,7 @@ import hashlib
 import json
 import zipfile
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
-from orient_eye import __version__
+from orient_eye.errors import InputError
 from orient_eye.files import write_atomically
 from orient_eye.search.optimum import Optimum, find_optimum
-from orient_eye.task.saccade import SaccadeTask, horizontal
+from orient_eye.state import State
+from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
-_SEARCH = "differential evolution 2"  # changes when the search does
+_SEARCH = "differential evolution 3"  # changes when the search does
 _SEED = 20_210
 
 
@@ -33,42 +35,36 @@ def cache_folder() -> Path:
 
 def searched_optimum(
     task: SaccadeTask,
-    start_yaw_deg: Array,
-    target_yaw_deg: Array,
+    start: State,
+    target: Array,
     *,
     progress: Callable[[float], None] | None = None,
     folder: Path | None = None,
 ) -> Optimum:
-    """The best actions of saccades between gaze directions [deg], each (saccades,), searched once.
+    """The best actions of saccades, searched once.
 
     Args:
         task: plant, command and reward.
-        start_yaw_deg: (saccades,).
-        target_yaw_deg: (saccades,).
+        start: where each saccade begins, of (saccades,).
+        target: desired orientations, (saccades, 4).
         progress: called with the share of the work done, when there is any.
         folder: of the cache; None for `cache_folder()`.
     """
     key = {
         "search": _SEARCH,
-        "version": __version__,
-        "task": task.identity(),
-        "start_yaw_deg": start_yaw_deg.tolist(),
-        "target_yaw_deg": target_yaw_deg.tolist(),
+        "version": metadata.version("orient-eye"),
+        "task": {name: value for name, value in task.identity().items() if name != "targets"},
+        "start": start.to_plain(),
+        "target": target.tolist(),
     }
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
     path = (folder or cache_folder()) / f"{name}.npz"
     kept = _read(path)
     if kept is not None:
         return kept
-    found = find_optimum(
-        task,
-        task.fixate(horizontal(start_yaw_deg)),
-        horizontal(target_yaw_deg),
-        np.random.default_rng(_SEED),
-        progress=progress,
-    )
+    found = find_optimum(task, start, target, np.random.default_rng(_SEED), progress=progress)
     arrays: dict[str, Any] = {"action": found.action, "reward": found.reward, "evaluations": found.evaluations}
-    with contextlib.suppress(OSError):  # a folder that cannot be written costs the next search, nothing else
+    with contextlib.suppress(InputError):  # a folder that cannot be written costs the next search, nothing else
         write_atomically(path, lambda temporary: np.savez(temporary, **arrays))
     return found
 

@@ -11,7 +11,7 @@ intervals. They still say nothing of errors that every sample shares: calibratio
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,6 +132,7 @@ def fit_model(model: Model, steps: Sequence[StepResponse], start: Array | None =
     solution = optimize.least_squares(
         residual,
         start,
+        jac="3-point",
         bounds=(low, high),
         x_scale=_scale(model, start),
         ftol=1e-12,
@@ -139,7 +140,7 @@ def fit_model(model: Model, steps: Sequence[StepResponse], start: Array | None =
         gtol=1e-12,
         max_nfev=_MAX_EVALUATIONS,
     )
-    fit = _judged(model, steps, solution.x, solution.fun, _jacobian(residual, solution.x, low, high))
+    fit = _judged(model, steps, solution.x, solution.fun, solution.jac)
     if solution.status == 0:
         unfinished = f"{model.title}: the search stopped after {_MAX_EVALUATIONS} steps, in a flat valley"
         return replace(fit, warnings=(*fit.warnings, unfinished))
@@ -168,17 +169,6 @@ def _thinned(step: StepResponse) -> StepResponse:
 def _scale(model: Model, start: Array) -> Array:
     typical = {"K": 1.0, "dead_time": 0.01}
     return np.array([typical.get(p.name, abs(v)) for p, v in zip(model.parameters, start, strict=True)])
-
-
-def _jacobian(residual: Callable[[Array], Array], values: Array, low: Array, high: Array) -> Array:
-    """By central differences, one-sided on a bound, (samples, parameters)."""
-    columns = []
-    for i, value in enumerate(values):
-        step = 1e-5 * max(abs(value), 1e-3)
-        up, down = values.copy(), values.copy()
-        up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
-        columns.append((residual(up) - residual(down)) / (up[i] - down[i]))
-    return np.stack(columns, axis=1)
 
 
 def _judged(model: Model, steps: Sequence[StepResponse], values: Array, residual: Array, jacobian: Array) -> Fit:

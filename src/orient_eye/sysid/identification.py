@@ -15,7 +15,7 @@ from scipy import stats
 
 from orient_eye.errors import InputError
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.plants import Plant, plant_in_words
+from orient_eye.plants import Plant
 from orient_eye.surrogate import Surrogate
 from orient_eye.sysid.comparison import Compared, HeldOut, compare, predict, preferred
 from orient_eye.sysid.fit import CONFIDENCE, Fit, fit_model
@@ -23,6 +23,7 @@ from orient_eye.sysid.models import MODELS
 from orient_eye.sysid.plant_steps import plant_steps
 from orient_eye.sysid.recording_checks import warnings_of
 from orient_eye.sysid.step_response import StepResponse
+from orient_eye.words import plant_in_words
 
 REFERENCE_DEG = 10.0
 """The thesis takes w0 from the step of this amplitude (section 3.3.1)."""
@@ -43,7 +44,8 @@ class Identification:
         held_out_fit: how the surrogate predicts them; for recordings, how the first-order fit to the
             others predicts each.
         warnings: for people.
-        trajectory: of a plant's steps.
+        plant: that was identified; None for recordings.
+        trajectory: of its steps.
     """
 
     steps: tuple[StepResponse, ...]
@@ -55,6 +57,7 @@ class Identification:
     held_out: tuple[StepResponse, ...]
     held_out_fit: tuple[HeldOut, ...]
     warnings: tuple[str, ...]
+    plant: Plant | None = None
     trajectory: Trajectory | None = None
 
     @property
@@ -67,8 +70,8 @@ def identify_plant(
     plant: Plant,
     amplitudes: Sequence[float],
     held_out: Sequence[float] = (),
-    motor: str = "motor2",
-    axis: str = "yaw",
+    motor: str | None = None,
+    axis: str | None = None,
 ) -> Identification:
     """Identify a plant as the thesis does (section 3.3.1, Figures 3.5 and 3.6).
 
@@ -77,17 +80,17 @@ def identify_plant(
 
     Args:
         plant: any.
-        amplitudes: of the steps to fit [deg].
-        held_out: of the steps to judge by [deg]; those among `amplitudes` are left out.
-        motor: that steps.
-        axis: yaw, pitch or roll.
+        amplitudes: of the steps to fit, in the motor's unit.
+        held_out: of the steps to judge by; those among `amplitudes` are left out.
+        motor: that steps; None for one that turns the eye about the axis.
+        axis: yaw, pitch or roll; None for what the motor, or the plant, turns: see `plant_steps`.
 
     Raises:
         InputError: see `plant_steps` and `fit_model`.
     """
     asked = [float(a) for a in amplitudes]
     if not asked:
-        raise InputError("no step amplitude given; name at least one, in deg of motor, as --amplitudes 5 10 20")
+        raise InputError("no step amplitude given; name at least one, in deg of motor, as 5 10 20")
     done = plant_steps(plant, [*asked, *(float(a) for a in held_out if float(a) not in asked)], motor, axis)
     steps, judges = done.steps[: len(asked)], done.steps[len(asked) :]
     fits = tuple((fit_model(MODELS["first_order"], [step]),) for step in steps)
@@ -101,12 +104,23 @@ def identify_plant(
     compared = compare(steps, judges)
     warnings = [*done.warnings, *(f"{s.name}: {w}" for s, (f,) in zip(steps, fits, strict=True) for w in f.warnings)]
     if abs(abs(A[nearest]) - REFERENCE_DEG) > 0.5:
-        warnings.append(f"w0 of the surrogate is that at {A[nearest]:g} deg, the step nearest to {REFERENCE_DEG:g}")
+        warnings.append(
+            f"w0 of the surrogate is that at {A[nearest]:g} {done.motor.unit}, the step nearest to {REFERENCE_DEG:g}"
+        )
+    unit, identity = done.motor.unit, plant.identity()
     source = (
-        f"steps of {motor} to {_listed(A)} deg on {plant_in_words(plant.identity())}; "
-        f"K: least squares over all amplitudes, w0: at {A[nearest]:g} deg"
+        f"steps of {done.motor.name} to {_listed(A)} {unit} on {plant_in_words(identity)}; "
+        f"K: least squares over all amplitudes, w0: at {A[nearest]:g} {unit}"
     )
-    number = Surrogate(gain, w0.value, motor, source, {"plant": plant.identity()})
+    number = Surrogate(
+        gain,
+        w0.value,
+        done.motor.name,
+        source,
+        eye=identity.get("eye"),
+        details={"plant": identity},
+        axis=done.axis,
+    )
     held_out_fit = tuple(
         predict(s.name, MODELS["first_order"].response(np.array([number.K, number.w0]), s), s) for s in judges
     )
@@ -120,6 +134,7 @@ def identify_plant(
         held_out=judges,
         held_out_fit=held_out_fit,
         warnings=tuple(warnings),
+        plant=plant,
         trajectory=done.trajectory[: len(asked)],
     )
 

@@ -12,9 +12,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from orient_eye.errors import InputError
+from orient_eye.figures import save
+from orient_eye.figures.identification import figure_3_5, figure_3_6, recorded_steps
 from orient_eye.files import write_text
-from orient_eye.movement.trajectory import EyeState, Trajectory
-from orient_eye.plants.lpf import LowPassPlant
+from orient_eye.movement.trajectory import Trajectory
+from orient_eye.plants import make_plant
+from orient_eye.recording import record
+from orient_eye.state import State
 from orient_eye.sysid.comparison import Compared, HeldOut
 from orient_eye.sysid.fit import Fit
 from orient_eye.sysid.identification import Identification
@@ -49,6 +57,7 @@ def write_report(found: Identification, folder: Path) -> dict[str, Any]:
 def summary(found: Identification) -> dict[str, Any]:
     """The result as plain values, for `--json`, without NaN or infinity."""
     number = found.surrogate
+    assert number.w0 is not None  # of first order, whatever model is preferred
     by_model = {row.fit.model.name: row for row in found.compared}
     least = min(row.aicc for row in found.compared)
     return {
@@ -142,21 +151,18 @@ def _csv(entries: list[dict[str, Any]]) -> str:
 
 
 def _pictures(found: Identification, folder: Path) -> list[str]:
-    from orient_eye import figures
-
     if found.trajectory is None:
-        figures.save(figures.recorded_steps(found), folder / "recordings.png")
+        save(recorded_steps(found), folder / "recordings.png")
         return ["recordings.png"]
-    figures.save(figures.figure_3_5(found), folder / "figure_3_5.png")
-    figures.save(figures.figure_3_6(found, _shown(len(found.steps))), folder / "figure_3_6.png")
+    save(figure_3_5(found), folder / "figure_3_5.png")
+    save(figure_3_6(found, _shown(len(found.steps))), folder / "figure_3_6.png")
     return ["figure_3_5.png", "figure_3_6.png"]
 
 
 def _recording(found: Identification, folder: Path) -> list[str]:
-    from orient_eye.recording import model_of, record
-
-    reference = None
-    if found.trajectory is not None:
+    reference = model = None
+    if found.trajectory is not None and found.plant is not None:
+        model = found.plant.drawn()
         shown = _shown(len(found.steps))
         trajectory, steps = found.trajectory[shown], [found.steps[i] for i in shown]
         reference = _surrogate_trajectory(found, trajectory)
@@ -167,23 +173,21 @@ def _recording(found: Identification, folder: Path) -> list[str]:
         if not steps:
             return []
         trajectory = replay(steps)
-        notes = "Recorded step responses, replayed on the model of the eye: its tendons and arms are the model's"
+        notes = "Recorded step responses; the ball stands for the eye of the rig"
     titles = [s.name for s in steps]
-    eye = model_of(found.surrogate.details.get("plant", {}))
-    record(folder / "recording.rrd", trajectory, model=eye, titles=titles, reference=reference, notes=notes)
+    record(folder / "recording.rrd", trajectory, model=model, titles=titles, reference=reference, notes=notes)
     return ["recording.rrd"]
 
 
-def _shown(count: int) -> Any:
-    import numpy as np
-
+def _shown(count: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(0, count - 1, min(count, _SHOWN_STEPS)).round().astype(int))
 
 
 def _surrogate_trajectory(found: Identification, trajectory: Trajectory) -> Trajectory | None:
-    """The surrogate under the same steps; None for a motor or axis that is not horizontal."""
-    if found.surrogate.motor != "motor2":
+    """The surrogate moved as the plant's motor did; None where it cannot follow."""
+    plant = make_plant("lpf", surrogate=found.surrogate, step_s=float(trajectory.time[1]))
+    motor = trajectory.motor[..., [trajectory.motor_names.index(found.surrogate.motor)]]
+    try:
+        return plant.move(motor, State(trajectory.orientation[:, 0], motor[:, 0])).trajectory()
+    except InputError:  # an eye that starts turned about another axis, as under gravity
         return None
-    plant = LowPassPlant(found.surrogate, step_s=float(trajectory.time[1]))
-    which = trajectory.motor_names.index("motor2")
-    return plant.simulate(trajectory.motor[..., [which]], EyeState(trajectory.orientation[:, 0]))

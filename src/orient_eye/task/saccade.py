@@ -1,50 +1,35 @@
 """One saccade from command to reward, a batch at a time, on any plant.
 
     task = SaccadeTask.of_case(make_plant("mujoco"), "1")
-    start = task.fixate(horizontal([0, 0]))          # the eye rests there
-    outcome = task.perform(start, action, horizontal([10, 20]))   # action (saccades, driven, 3): B, D, k0
+    start, target = saccades(task.targets, [[0.0]], [[20.0]])
+    outcome = task.perform(start, action, target)    # action (saccades, numbers): B, D, k0
 
-The low-pass plant is measured in closed form, every other plant from its sampled trajectory.
+Command, movement, measures, reward: each is asked of the part that knows it, and none is asked what kind it is.
 """
 
-from dataclasses import asdict, dataclass, field
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from orient_eye.commands.pulse_step import FIXED_C, SPEED_LIMIT, PulseStep, keeps_speed_limit, varying_C
+from orient_eye.commands import Command
+from orient_eye.constants import BAND, HORIZON_S, SPEED_LIMIT
 from orient_eye.errors import InputError
-from orient_eye.movement.measures import BAND, Measures, measure, measure_response
-from orient_eye.movement.trajectory import EyeState, Trajectory
-from orient_eye.plants import Plant
-from orient_eye.plants.lpf import LowPassPlant
-from orient_eye.rotations import from_yaw
-from orient_eye.task.reward import Reward, Weights, reward
+from orient_eye.movement import Movement
+from orient_eye.movement.measures import Measures
+from orient_eye.movement.trajectory import Trajectory
+from orient_eye.plants import Plant, restore_plant
+from orient_eye.state import State
+from orient_eye.task.actions import ACTIONS, ActionSpace, restore_actions
+from orient_eye.task.cases import CASES, Case
+from orient_eye.task.judge import JUDGES, Reward
+from orient_eye.task.known_weights import with_known_weights
+from orient_eye.task.targets import Targets, make_targets, restore_targets
 
 Array = NDArray[np.float64]
-B_RANGE = (18.0, 80.0)
-"""Bounds of B in the action [1/s]."""
-K0_RANGE = (5.0, 40.0)
-"""Bounds of k0 in the action [1/s]."""
-YAW_RANGE_DEG = (-35.0, 35.0)
-"""Starts and targets are drawn from here (thesis 4.6)."""
-
-
-@dataclass(frozen=True)
-class Fixation:
-    """Where saccades start: an eye at rest.
-
-    Attributes:
-        orientation: (saccades, 4).
-        motor: positions that hold it [deg], (saccades, motors).
-    """
-
-    orientation: Array
-    motor: Array
-
-    def __getitem__(self, which: NDArray[np.intp]) -> "Fixation":
-        return Fixation(self.orientation[which], self.motor[which])
 
 
 @dataclass(frozen=True)
@@ -52,195 +37,165 @@ class Outcome:
     """What came of a batch of saccades.
 
     Attributes:
-        command: the pulse-steps.
-        measures: of the eye's movement.
+        command: what the motors were told.
+        movement: what the eye did.
+        measures: of the movement.
         reward: its terms and total.
-        saturated: True where the command reached beyond a motor's mechanical range and stayed at it.
-        too_fast: True where C varies and no C holds the command to the speed limit.
     """
 
-    command: PulseStep
+    command: Command
+    movement: Movement
     measures: Measures
     reward: Reward
-    saturated: NDArray[np.bool_]
-    too_fast: NDArray[np.bool_]
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """Where the command reached beyond a motor's mechanical range and the motor stayed at it, (saccades,)."""
+        return self.movement.saturated
+
+    @property
+    def limited(self) -> NDArray[np.bool_]:
+        """Where a limit of speed or acceleration kept a motor from where it was told to be, (saccades,)."""
+        return self.movement.limited
+
+    @property
+    def too_fast(self) -> NDArray[np.bool_]:
+        """Where C was to hold the command to a speed limit and none does, (saccades,)."""
+        return self.command.too_fast
 
 
 @dataclass(frozen=True)
 class SaccadeTask:
-    """A plant, the kind of command it gets, and how the result is judged.
+    """A plant, what an action on it means, which saccades are to be made, and how they are judged.
 
     Attributes:
         plant: any plant.
-        driven: motors the policy commands; the others stand at 0.
-        variant: of the pulse.
-        C: onset rate [1/s] of variants 2 and 3; None for the thesis' fixed value, "varying" for the value
-            that brings the motor to the speed limit.
-        speed_limit: V [deg/s], for a varying C.
-        weights: of the reward; unless given, those of case 1 on the low-pass plant, whatever the plant and
-            variant: `of_case` knows the others.
+        actions: what an action means.
+        targets: starts and targets.
+        weights: of the judge's terms, by name.
+        judge: a name of `orient_eye.task.judge.JUDGES`.
         band: settling band, share of the amplitude.
-        horizon_s: how long a simulated saccade lasts; the low-pass plant has no horizon.
+        horizon_s: how long a saccade lasts on a plant that needs a horizon, and in every trajectory.
+        weights_from: where the weights are from, for people.
     """
 
     plant: Plant
-    driven: tuple[str, ...] = ("motor2",)
-    variant: int = 1
-    C: float | str | None = None
-    speed_limit: float = SPEED_LIMIT
-    weights: Weights = field(default_factory=Weights)
+    actions: ActionSpace
+    targets: Targets
+    weights: Mapping[str, float]
+    judge: str = "orientation"
     band: float = BAND
-    horizon_s: float = 0.5
+    horizon_s: float = HORIZON_S
+    weights_from: str = "given"
 
     def __post_init__(self) -> None:
-        missing = [name for name in self.driven if name not in self.plant.motors]
-        if missing or not self.driven:
-            raise InputError(
-                f"plant {self.plant.name!r} has the motors {', '.join(self.plant.motors)}; cannot drive {missing}"
-            )
-        if isinstance(self.C, str) and self.C != "varying":
-            raise InputError(f"C is a number [1/s], 'varying' or nothing, got {self.C!r}")
-        if not (self.speed_limit > 0 and self.horizon_s > 0):
-            raise InputError(f"speed limit and horizon must be positive, got {self.speed_limit} and {self.horizon_s}")
+        object.__setattr__(self, "weights", JUDGES[self.judge].weights(self.weights))
+        if not 0 < self.horizon_s < np.inf:
+            raise InputError(f"the horizon must be positive and finite, got {self.horizon_s} s")
         if not 0 < self.band < 1:
             raise InputError(f"the settling band is a share of the amplitude between 0 and 1, got {self.band}")
 
     @classmethod
-    def of_case(cls, plant: Plant, case: str, **options: Any) -> "SaccadeTask":
-        """One of the thesis' five cases (`orient_eye.task.cases.CASES`) on a plant.
+    def of_case(
+        cls,
+        plant: Plant,
+        case: str | Case = "1",
+        *,
+        targets: str | Targets = "horizontal",
+        driven: Sequence[str] | None = None,
+        weights: Mapping[str, float] | Sequence[float] | None = None,
+        judge: str | None = None,
+        actions: str = "pulse-step",
+        band: float = BAND,
+        speed_limit: float = SPEED_LIMIT,
+        horizon_s: float | None = None,
+    ) -> "SaccadeTask":
+        """A learning case on a plant.
 
         Args:
             plant: any plant.
-            case: its name.
-            options: attributes that differ from the case's.
+            case: a name of `orient_eye.task.cases.CASES`, or a case.
+            targets: a name of `orient_eye.task.targets.TARGETS`, or a set made for this plant.
+            driven: motors that the action commands; None for those that the targets need.
+            weights: of the reward's terms, by name or in their order; None for those of the case on this plant, which
+                are solved where nobody has solved them (`orient_eye.task.known_weights`).
+            judge: a name of `orient_eye.task.judge.JUDGES`; None for that of the targets.
+            actions: a name of `orient_eye.task.actions.ACTIONS`.
+            band: settling band, share of the amplitude.
+            speed_limit: V [deg/s], for a varying C.
+            horizon_s: of a simulated saccade; None for the plant's own.
 
         Raises:
-            InputError: unknown case.
+            InputError: an unknown name, or numbers that are none.
         """
-        from orient_eye.task.cases import get_case
-
-        chosen = get_case(case)
-        of_case = {"variant": chosen.variant, "C": chosen.C, "weights": chosen.weights(plant.name)}
-        return cls(plant, **{**of_case, **options})
+        case = CASES[case] if isinstance(case, str) else case
+        if isinstance(targets, str):
+            targets = make_targets(targets, plant, driven=None if driven is None else tuple(driven))
+        meant = ACTIONS[actions](plant, driven or targets.driven, pulse=case.pulse, C=case.C, speed_limit=speed_limit)
+        judge = judge or targets.of
+        told = JUDGES[judge].weights(dict.fromkeys(JUDGES[judge].names, 1.0) if weights is None else weights)
+        task = cls(plant, meant, targets, told, judge, band, horizon_s or plant.horizon_s or HORIZON_S)
+        if weights is not None:
+            return task
+        return with_known_weights(task)
 
     def identity(self) -> dict[str, Any]:
         """Everything that decides what an action is worth, in plain values: for manifests and caches."""
-        return {
+        identity = {
             "plant": self.plant.identity(),
-            "driven": list(self.driven),
-            "variant": self.variant,
-            "C": self.onset,
-            "speed_limit": self.speed_limit if self.onset == "varying" else None,
-            "weights": asdict(self.weights),
+            "actions": self.actions.identity(),
+            "targets": self.targets.identity(),
+            "judge": self.judge,
+            "weights": dict(self.weights),
             "band": self.band,
-            "horizon_s": None if isinstance(self.plant, LowPassPlant) else self.horizon_s,
-            "low": self.action_low.tolist(),
-            "high": self.action_high.tolist(),
+            "horizon_s": None if self.plant.horizon_s is None else self.horizon_s,
         }
+        plain: dict[str, Any] = json.loads(json.dumps(identity))
+        return plain
 
-    @property
-    def onset(self) -> float | str | None:
-        """C as it is used: a number, "varying", or None in variant 1."""
-        return FIXED_C[self.variant] if self.C is None and self.variant in FIXED_C else self.C
-
-    @property
-    def action_low(self) -> Array:
-        """Lower bounds of B, D, k0, (driven, 3)."""
-        return self._bounds(0)
-
-    @property
-    def action_high(self) -> Array:
-        """Upper bounds of B, D, k0, (driven, 3)."""
-        return self._bounds(1)
-
-    def _bounds(self, end: int) -> Array:
-        D = self.plant.action_range_deg[self.driven_index, end]
-        return np.stack([np.full_like(D, B_RANGE[end]), D, np.full_like(D, K0_RANGE[end])], axis=-1)
-
-    @property
-    def driven_index(self) -> list[int]:
-        """Indices of the driven motors among the plant's."""
-        return [self.plant.motors.index(name) for name in self.driven]
-
-    def fixate(self, orientation: Array) -> Fixation:
-        """Rest in orientations (saccades, 4), held by the driven motors.
-
-        Raises:
-            InputError: an orientation the driven motors cannot hold.
-        """
-        return Fixation(orientation, self.plant.rest_motor(orientation, self.driven))
-
-    def lands_on(self, target: Array) -> Array:
-        """D [deg] of each driven motor at which the eye rests on targets (saccades, 4); (saccades, driven)."""
-        return self.plant.rest_motor(target, self.driven)[:, self.driven_index]
-
-    def pulse_step(self, start: Fixation, action: Array) -> PulseStep:
-        """The motor command of an action.
+    @classmethod
+    def restore(cls, identity: Mapping[str, Any], plant: Plant | None = None) -> "SaccadeTask":
+        """The task of an identity.
 
         Args:
-            start: where the eye rests; its motor positions are F.
-            action: B [1/s], D [deg], k0 [1/s] of each driven motor, (saccades, driven, 3).
-        """
-        B, D, k0 = (np.asarray(action, float)[..., i] for i in range(3))
-        F = start.motor[:, self.driven_index]
-        C: ArrayLike | None = None
-        if self.variant in FIXED_C:
-            C = self.onset
-            if C == "varying":
-                C = varying_C(self.variant, D - F, B, k0, self.speed_limit)
-        return PulseStep(F, B, D, k0, self.variant, C)
+            identity: from `identity`.
+            plant: the same actions, targets and reward on this plant instead; its horizon is then the plant's own.
 
-    def perform(self, start: Fixation, action: Array, target: Array) -> Outcome:
+        Raises:
+            InputError: it describes no task of this version.
+        """
+        try:
+            own = restore_plant(identity["plant"]) if plant is None else plant
+            driven = tuple(identity["actions"]["driven"])
+            return cls(
+                own,
+                restore_actions(identity["actions"], own),
+                restore_targets(identity["targets"], own, driven),
+                identity["weights"],
+                str(identity["judge"]),
+                float(identity["band"]),
+                float((identity["horizon_s"] if plant is None else own.horizon_s) or HORIZON_S),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"this describes no task of this version ({error!r})") from error
+
+    def perform(self, start: State, action: Array, target: Array, random: np.random.Generator | None = None) -> Outcome:
         """Command, move, measure and judge a batch of saccades.
 
         Args:
-            start: where the eye rests.
-            action: B, D, k0 of each driven motor, (saccades, driven, 3).
+            start: of the eyes.
+            action: in units, (saccades, numbers).
             target: desired orientations, (saccades, 4).
+            random: of a plant that is noisy.
         """
-        command = self.pulse_step(start, action)
-        if isinstance(self.plant, LowPassPlant):
-            measures = measure_response(self.plant.respond(command), band=self.band)
-            saturated = np.zeros(len(action), bool)
-        else:
-            trajectory, saturated = self._simulate(start, command)
-            final = start.motor.copy()
-            final[:, self.driven_index] = command.D
-            measures = measure(trajectory, self.plant.rest_orientation(final), band=self.band)
-        found = reward(measures, command.energy(), target, self.weights)
-        return Outcome(command, measures, found, saturated, self._too_fast(command))
+        judge = JUDGES[self.judge]
+        command = self.actions.command(start, target, action)
+        movement = self.plant.move(command, start, self.horizon_s, random)
+        measures = movement.measure(self.band, judge.of)
+        return Outcome(command, movement, measures, judge.reward(movement, measures, target, self.weights))
 
-    def _too_fast(self, command: PulseStep) -> NDArray[np.bool_]:
-        if self.onset != "varying":
-            return np.zeros(len(command.B), bool)
-        step = command.D - command.F
-        return ~np.all(keeps_speed_limit(self.variant, step, command.B, command.k0, self.speed_limit), axis=1)
-
-    def trajectory(self, start: Fixation, action: Array) -> Trajectory:
-        """The eye's movement under an action, sampled over the horizon."""
-        command = self.pulse_step(start, action)
-        if isinstance(self.plant, LowPassPlant):
-            return self.plant.trajectory(command, self._samples)
-        return self._simulate(start, command)[0]
-
-    @property
-    def _samples(self) -> int:
-        return round(self.horizon_s / self.plant.step_s) + 1
-
-    def _simulate(self, start: Fixation, command: PulseStep) -> tuple[Trajectory, NDArray[np.bool_]]:
-        motor = np.repeat(start.motor[:, None], self._samples, axis=1)
-        motor[..., self.driven_index] = command.sample(self.plant.step_s, self._samples)
-        low, high = self.plant.motor_range_deg.T
-        held = np.clip(motor, low, high)
-        saturated = ((motor < low) | (motor > high)).any(axis=(1, 2))
-        return self.plant.simulate(held, EyeState(start.orientation)), saturated
-
-    def draw_yaw(self, count: int, random: np.random.Generator) -> tuple[Array, Array]:
-        """Yaw of starts and targets [deg], each (count,), uniform over +-35 deg (thesis 4.6)."""
-        start, target = random.uniform(*YAW_RANGE_DEG, (2, count))
-        return start, target
-
-
-def horizontal(yaw_deg: ArrayLike) -> Array:
-    """Orientations (saccades, 4) of horizontal gaze directions [deg] (saccades,)."""
-    return from_yaw(np.atleast_1d(np.asarray(yaw_deg, float)))
+    def trajectory(self, start: State, action: Array, target: Array) -> Trajectory:
+        """The movement under an action over time."""
+        return self.plant.move(self.actions.command(start, target, action), start, self.horizon_s).trajectory()

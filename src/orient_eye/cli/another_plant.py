@@ -1,0 +1,37 @@
+"""Options that predict and evaluate share: a policy on another plant than its own."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from orient_eye.learning.policy import Policy
+    from orient_eye.task.saccade import SaccadeTask
+
+
+@dataclass(frozen=True)
+class AnotherPlant:
+    """To use the policy on another plant than its own."""
+
+    plant: Annotated[str | None, tyro.conf.arg(help_behavior_hint="(default: the policy's own)")] = None
+    """The plant; one the policy was not trained on is refused without --force."""
+    plant_options: dict[str, Any] = field(default_factory=dict)
+    force: bool = False
+    """Use the policy although the plant is not the one it was trained on."""
+
+    def task(self, policy: "Policy") -> "tuple[SaccadeTask, list[str]]":
+        """The task on that plant, and in words what differs from the one the policy was trained on.
+
+        Raises:
+            InputError: something differs, and it is not forced.
+        """
+        from orient_eye.cli.tables import say
+        from orient_eye.plants import make_plant
+
+        plant = None if self.plant is None else make_plant(self.plant, **self.plant_options)
+        task = policy.task(plant)
+        differences = policy.require(task, force=self.force)
+        if differences:
+            say(f"forced: this policy was trained for {'; '.join(differences)}", "yellow")
+        return task, differences

@@ -1,0 +1,91 @@
+"""The options --start, --target and --pairs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from orient_eye.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from orient_eye.task.targets import Targets
+
+    Array = NDArray[np.float64]
+
+
+def _angles(words: str) -> Any:
+    return tyro.conf.arg(metavar="ANGLE ...", help_behavior_hint=words)
+
+
+@dataclass(frozen=True)
+class Saccades:
+    """Which saccades, told by the angles of the task's targets."""
+
+    start: Annotated[tuple[float, ...] | None, _angles("(default: straight ahead)")] = None
+    """Direction in which the saccade begins, deg: one number for horizontal targets, the yaw, positive to the left."""
+    target: Annotated[tuple[float, ...] | None, _angles("(required without --pairs)")] = None
+    """Direction in which it should end, deg."""
+    pairs: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(optional)")] = None
+    """Many saccades instead: a CSV file with the columns start_yaw_deg and target_yaw_deg for horizontal targets."""
+
+    def angles(self, targets: "Targets", *, drawn: bool = False) -> "tuple[Array, Array]":
+        """Angles [deg] (saccades, angles) of starts and targets.
+
+        Args:
+            targets: of the task.
+            drawn: refuse also what the targets never draw.
+
+        Raises:
+            InputError: both or neither are given, other numbers of angles, or what `Targets.check` refuses.
+        """
+        import numpy as np
+
+        if self.pairs is not None and (self.start is not None or self.target is not None):
+            raise InputError("give --pairs, or --start and --target, not both")
+        if self.pairs is not None:
+            ends = read_pairs(self.pairs, targets.angles)
+        elif self.target is None:
+            raise InputError(
+                f"name a saccade by --start and --target ({_told(targets.angles)}), or many by --pairs FILE.csv"
+            )
+        else:
+            begin = (0.0,) * len(targets.angles) if self.start is None else self.start
+            ends = (
+                np.array([direction(targets.angles, begin, "start")]),
+                np.array([direction(targets.angles, self.target, "target")]),
+            )
+        for what, angles in zip(("start", "target"), ends, strict=True):
+            targets.check(angles, what, drawn=drawn)
+        return ends
+
+
+def direction(angles: tuple[str, ...], given: tuple[float, ...], what: str) -> tuple[float, ...]:
+    """Where a saccade starts or ends, if it is told by as many numbers as there are angles.
+
+    Raises:
+        InputError: by another number of them.
+    """
+    if len(given) != len(angles):
+        raise InputError(f"--{what} takes {_told(angles)}: as many numbers, not {len(given)}")
+    return given
+
+
+def read_pairs(path: Path, angles: tuple[str, ...]) -> "tuple[Array, Array]":
+    """Angles [deg] (saccades, angles) of starts and targets, from the columns start_ANGLE and target_ANGLE of a table.
+
+    Raises:
+        InputError: unreadable, a column missing, no rows, or cells that are no finite numbers.
+    """
+    from orient_eye.tables import read_table
+
+    names = [tuple(f"{what}_{angle}" for angle in angles) for what in ("start", "target")]
+    table = read_table(path, ",".join(names[0] + names[1]))
+    return table.stack(names[0]), table.stack(names[1])
+
+
+def _told(angles: tuple[str, ...]) -> str:
+    return ", ".join(f"{angle.removesuffix('_deg').upper()} [deg]" for angle in angles)

@@ -1,0 +1,175 @@
+"""The compiled eye: an MJCF file of `eye_mjcf`, changed as a preset says, with named access to its parts.
+
+    model = build_model("eve_v3")                    # a name of `orient_eye.eyes.EYES`, or an MJCF file
+    motors(model)                                    # what turns it, read from the model
+
+Constants are read from the compiled model, never written a second time.
+"""
+
+import hashlib
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from orient_eye.errors import InputError
+from orient_eye.eyes import EYES
+from orient_eye.motor import Motor
+from orient_eye.resources import data_folder
+
+Array = NDArray[np.float64]
+STANDARD_GRAVITY = 9.81
+"""m/s^2, as in the thesis author's simulator."""
+WORKING_RANGE_DEG = 40.0
+"""Where a policy may send a motor of the elastic eye: 61.8 deg of yaw. The straight tendons run inside the
+eyeball already at small angles, and past about 50 deg of motor the response bends over; targets within 35 deg
+of yaw need 23.5."""
+
+
+def build_model(
+    eye: str = "thesis", *, step_s: float = 0.001, gravity: bool = False, visual: bool = True
+) -> mujoco.MjModel:
+    """Compile an eye.
+
+    Args:
+        eye: preset, one of `EYES`, or an MJCF file of the same form (CONTRIBUTING: "Add an eye").
+        step_s: integration step [s]; the servos' gains follow it.
+        gravity: add the gravity torque of the thesis, Cm x m g (3.8, 3.9), as a constant force at
+            the centre of mass. It adds an actuator without control, after the motors'.
+        visual: keep meshes and cameras; without them the physics is the same, and `model_hash` does not
+            change with the looks.
+
+    Raises:
+        InputError: unknown preset, a file that is no such model, or a step for which the explicit friction
+            would diverge.
+    """
+    spec = load_spec(eye)
+    try:
+        longest = 2 * min(_inertia_diagonal(spec)) / float(spec.joint("eye").damping[0])
+        if not 0 < step_s < longest:
+            raise InputError(f"the integration step must be between 0 and {longest:.2g} s, got {step_s} s")
+        spec.option.timestep = step_s
+        for motor in spec.actuators:
+            # An arm stands where its control says one step later: `eye3.xml` has the reason.
+            armature, gear = float(spec.joint(motor.target).armature), motor.gear[0]
+            motor.gainprm[0] = armature / (gear * step_s) ** 2
+            motor.biasprm[1:3] = [-motor.gainprm[0], -motor.gainprm[0] * step_s]
+        if gravity:
+            _add_gravity(spec)
+        if not visual:
+            spec.compiler.discardvisual = True
+            for camera in list(spec.cameras):
+                spec.delete(camera)
+        model = spec.compile()
+        _check_parts(model)
+    except (ValueError, KeyError, AttributeError) as error:  # a part is not there, or does not compile
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"eye {eye!r} is no eye of this form: {error}; see CONTRIBUTING, add an eye") from error
+    return model
+
+
+def ball() -> mujoco.MjModel:
+    """An eye without motors or tendons, to draw what has none."""
+    return mujoco.MjSpec.from_file(str(data_folder("eye_mjcf") / "ball.xml")).compile()
+
+
+def load_spec(eye: str) -> mujoco.MjSpec:
+    """An eye that is not compiled: a preset, one of `EYES`, or an MJCF file.
+
+    Raises:
+        InputError: unknown, or a file that cannot be read.
+    """
+    if eye not in EYES:
+        file = Path(eye)
+        if file.suffix != ".xml":
+            raise InputError(f"unknown eye {eye!r}; choose one of {', '.join(EYES)}, or an MJCF file NAME.xml")
+        return _read(file)
+    preset = EYES[eye]
+    spec = _read(preset.file if preset.file.is_absolute() else data_folder("eye_mjcf") / preset.file)
+    if preset.change is not None:
+        preset.change(spec)
+    return spec
+
+
+def _read(file: Path) -> mujoco.MjSpec:
+    try:
+        return mujoco.MjSpec.from_file(str(file))
+    except (ValueError, OSError) as error:
+        raise InputError(f"cannot read the eye {file}: {error}") from error
+
+
+def _check_parts(model: mujoco.MjModel) -> None:
+    """Everything that a plant asks for by name is there: KeyError otherwise."""
+    for name in ("orientation", "angular_velocity"):
+        model.sensor(name)
+    for i in range(model.ntendon):
+        model.sensor(f"length_{model.tendon(i).name}")
+    model.site("gaze"), model.site("centre_of_mass"), model.body("eye")
+    if not motors(model):
+        raise ValueError("it has no motor: no actuator of a joint")
+
+
+def _inertia_diagonal(spec: mujoco.MjSpec) -> list[float]:
+    eye = spec.body("eye")
+    return [float(x) for x in (eye.fullinertia[:3] if np.isfinite(eye.fullinertia[0]) else eye.inertia)]
+
+
+def _add_gravity(spec: mujoco.MjSpec) -> None:
+    # The thesis takes the inertia about the centre of rotation and the centre of mass off it, which
+    # no rigid body allows (m r^2 alone exceeds that inertia): the weight is a force, not a mass.
+    spec.worldbody.add_site(name="head")
+    weight = float(spec.body("eye").mass) * STANDARD_GRAVITY
+    spec.add_actuator(
+        name="gravity",
+        trntype=mujoco.mjtTrn.mjTRN_SITE,
+        target="centre_of_mass",
+        refsite="head",
+        gear=[0, 0, -1, 0, 0, 0],
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        gainprm=[0] * 10,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        biasprm=[weight] + [0] * 9,
+    )
+
+
+def motors(model: mujoco.MjModel) -> tuple[Motor, ...]:
+    """What turns the eye: the actuators of joints, in the order of `ctrl`; their controls are angles."""
+    joined = (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).nonzero()[0]
+    working = (-WORKING_RANGE_DEG, WORKING_RANGE_DEG)
+    found = []
+    for i in joined:
+        low, high = np.rad2deg(model.actuator_ctrlrange[i]).tolist()
+        limits = (low, high) if model.actuator_ctrllimited[i] else (-np.inf, np.inf)
+        found.append(Motor(model.actuator(i).name, "deg", limits, working))
+    return tuple(found)
+
+
+def tendon_tension(model: mujoco.MjModel, length: Array) -> Array:
+    """Tension [N] (..., tendons) of the elastics at these lengths [m]; they pull only (3.2)."""
+    return model.tendon_stiffness * np.maximum(length - model.tendon_lengthspring[:, 1], 0)
+
+
+_PHYSICS = (
+    "body_parentid", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia",
+    "jnt_type", "jnt_bodyid", "jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness", "dof_damping", "dof_armature",
+    "dof_frictionloss", "site_bodyid", "site_pos", "site_quat", "tendon_stiffness", "tendon_damping",
+    "tendon_lengthspring", "wrap_type", "wrap_objid", "wrap_prm", "actuator_trntype", "actuator_trnid",
+    "actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange",
+)  # fmt: skip
+
+
+def model_hash(model: mujoco.MjModel) -> str:
+    """Identity of an eye: SHA-256 over everything that moves it, 16 digits.
+
+    Numbers count to 12 digits and looks do not, so that neither the machine nor another version of MuJoCo
+    makes the same eye another one.
+    """
+    option = model.opt
+    numbers = {
+        "option": [option.timestep, option.integrator, option.disableflags, *option.gravity],
+        **{name: getattr(model, name).ravel() for name in _PHYSICS},
+    }
+    text = "\n".join(f"{name} {' '.join(f'{x + 0.0:.12g}' for x in values)}" for name, values in numbers.items())
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

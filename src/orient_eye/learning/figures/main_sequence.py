@@ -1,0 +1,115 @@
+"""Peak velocity, duration and skewness of saccades, beside those of people."""
+
+import csv
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from orient_eye.figures import tidy
+from orient_eye.learning.figures.saccades import (
+    HUMAN,
+    LEARNED,
+    SHOWN_DEG,
+    THIRD,
+    Saccades,
+    draw_speed,
+    mean_and_range,
+    size_axis,
+    titled,
+)
+from orient_eye.learning.policy import Policy
+from orient_eye.resources import data_folder
+from orient_eye.task.saccade import SaccadeTask
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+
+def figure_5_4(policy: Policy, task: SaccadeTask) -> Figure:
+    """Main sequence and velocity profiles, beside human saccades (thesis Figures 5.4, 5.8, 5.13, ...).
+
+    A human saccade ends where its speed falls below a threshold, ours where the eye stays within the
+    settling band, which is later.
+    """
+    figure = Figure(figsize=(13, 8.4), layout="constrained")
+    (peak, profiles), (duration, skewness) = figure.subplots(2, 2)
+    every = Saccades.every_size(task, policy)
+    measures = every.outcome.measures
+    mean_and_range(peak, every.size_deg, measures.peak_velocity_deg_s, LEARNED, "policy")
+    mean_and_range(duration, every.size_deg, 1e3 * measures.settling_time_s, LEARNED, "policy")
+    order = measures.settling_time_s.argsort()
+    skewness.plot(
+        1e3 * measures.settling_time_s[order], measures.skewness[order], ".", ms=3, color=LEARNED, label="policy"
+    )
+    largest_deg = 2 * task.targets.limit_deg
+    _draw_human(peak, duration, skewness, largest_deg)
+    draw_speed(profiles, Saccades.symmetric(task, policy, SHOWN_DEG))
+    profiles.set_title("velocity profiles")
+    peak.set(ylabel="peak velocity [deg/s]", title="main sequence")
+    duration.set(ylabel="duration [ms]")
+    skewness.set(xlabel="duration [ms]", ylabel="skewness: deceleration time / duration", ylim=(0.4, 1))
+    for axes in (peak, duration):
+        size_axis(axes, task)
+        axes.set_ylim(bottom=0)
+        axes.legend(frameon=False, fontsize="small")
+    skewness.legend(
+        frameon=False, fontsize="small", title="human durations: 21 ms + 2.2 ms/deg", title_fontsize="small"
+    )
+    for axes in (peak, duration, skewness):
+        tidy(axes)
+    return titled(figure, "Main sequence and skewness", policy, task)
+
+
+def draw_main_sequence(axes: "Axes", policy: Policy, task: SaccadeTask) -> None:
+    """Peak velocity and duration against size in one panel."""
+    every = Saccades.every_size(task, policy)
+    measures = every.outcome.measures
+    twin = axes.twinx()
+    mean_and_range(axes, every.size_deg, measures.peak_velocity_deg_s, LEARNED, "peak velocity")
+    mean_and_range(twin, every.size_deg, 1e3 * measures.settling_time_s, THIRD, "duration")
+    size_axis(axes, task)
+    axes.set(ylabel="peak velocity [deg/s]", title="main sequence")
+    axes.set_ylim(bottom=0)
+    twin.set_ylabel("duration [ms]")
+    twin.set_ylim(bottom=0)
+    axes.yaxis.label.set_color(LEARNED)
+    twin.yaxis.label.set_color(THIRD)
+    tidy(axes)
+    twin.spines["top"].set_visible(False)
+
+
+def _draw_human(peak: "Axes", duration: "Axes", skewness: "Axes", largest_deg: float) -> None:
+    """Human saccades: peak velocity and duration against size, skewness against duration."""
+    with (data_folder("models") / "human" / "main_sequence.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    studies = dict.fromkeys(_study(row) for row in rows)
+    markers = dict(zip(studies, "osDv^P", strict=False))
+    line = {row["quantity"]: float(row["value"]) for row in rows if row["quantity"].startswith("duration_")}
+    for study, marker in markers.items():
+        style: dict[str, Any] = {"marker": marker, "ls": "", "color": HUMAN, "ms": 5, "capsize": 2, "elinewidth": 0.8}
+        style["label"] = f"human: {study}"
+        for quantity, axes in (("peak_velocity", peak), ("duration", duration), ("acceleration_fraction", skewness)):
+            chosen = [row for row in rows if row["quantity"] == quantity and _study(row) == study]
+            x, y = (np.array([float(row[name]) for row in chosen]) for name in ("amplitude_deg", "value"))
+            spread = np.array([float(row["spread_sd"] or 0) for row in chosen])
+            if quantity == "acceleration_fraction":
+                x, y = line["duration_intercept"] + line["duration_slope"] * x, 1 - y
+            if chosen:
+                axes.errorbar(x, y, yerr=spread if spread.any() else None, **style)
+    size = np.array([0.0, largest_deg])
+    words = f"human: {line['duration_intercept']:g} ms + {line['duration_slope']:g} ms/deg (Carpenter 1988)"
+    duration.plot(size, line["duration_intercept"] + line["duration_slope"] * size, ":", color=HUMAN, label=words)
+
+
+def _study(row: dict[str, str]) -> str:
+    """Short name of the study a row of the human data is from."""
+    names = {
+        "Collewijn": "Collewijn et al. 1988",
+        "Andersson": "Andersson et al. 2017",
+        "PMC": "100 adults, PMC6143243",
+    }
+    return next((name for part, name in names.items() if part in row["source"]), row["source"])

@@ -1,0 +1,43 @@
+"""The progress bar of everything that takes long.
+
+    with progress_bar("searching the optimum", quiet=quiet) as advance:
+        searched_optimum(task, start, target, progress=advance)
+
+Bars that follow one another stand in blocks of their own.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+
+class Advance(Protocol):
+    """Moves a bar."""
+
+    def __call__(self, share: float, note: str = "") -> None:
+        """Show the share of the work that is done, 0 to 1, and a note behind the bar (rich's markup)."""
+        ...
+
+
+@contextmanager
+def progress_bar(words: str, *, quiet: bool = False) -> Iterator[Advance]:
+    """A bar on standard error that goes away when the block ends; none where that is no terminal, or if quiet.
+
+    Args:
+        words: what is being done.
+        quiet: show nothing.
+    """
+    console = Console(stderr=True)
+    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %")
+    note = TextColumn("{task.fields[note]}")
+    hidden = quiet or not console.is_terminal
+    with Progress(*columns, TimeRemainingColumn(), note, console=console, transient=True, disable=hidden) as bar:
+        job = bar.add_task(words, total=1.0, note="")
+
+        def advance(share: float, note: str = "") -> None:
+            bar.update(job, completed=share, note=note)
+
+        yield advance

@@ -1,0 +1,229 @@
+"""What an action means: described numbers, and the command they make.
+
+    actions = PulseStepActions(plant, driven=("motor2",), pulse="1")
+    actions.names                                    # ("B", "D", "k0")
+    actions.command(start, target, action)           # action (saccades, numbers), in units
+    actions.from_unit(scaled)                        # from a network's -1 .. 1
+
+Search, policy, environment and command line know of an action what stands in its `Number`s. Another kind of
+action is a class with these members and a line in `ACTIONS`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from orient_eye.commands import Command
+from orient_eye.commands.pulse_step import PulseStep
+from orient_eye.commands.pulses import PULSES, keeps_speed_limit, varying_C
+from orient_eye.constants import SPEED_LIMIT
+from orient_eye.errors import InputError
+from orient_eye.motor import check_driven
+from orient_eye.plants import Plant, PulseRates
+from orient_eye.registry import Registry
+from orient_eye.state import State
+
+Array = NDArray[np.float64]
+B_RANGE = (18.0, 80.0)
+"""Bounds of B in the action [1/s]."""
+K0_RANGE = (5.0, 40.0)
+"""Bounds of k0 in the action [1/s]."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of an action.
+
+    Attributes:
+        symbol: of the thesis, where it has one.
+        unit: "1/s".
+        motor: that it commands; "" for several.
+        low: least value.
+        high: largest value.
+        log: spread evenly on a logarithmic scale.
+        difference: half-width of a central difference, in its unit (thesis 4.4.5).
+        fine: share of the range around a good value in which a search looks closer.
+        cliff: whether the reward may have a cliff along it, so that a search stays on all sides.
+    """
+
+    symbol: str
+    unit: str
+    motor: str
+    low: float
+    high: float
+    log: bool = False
+    difference: float = 0.05
+    fine: float = 0.03
+    cliff: bool = False
+
+
+class ActionSpace(ABC):
+    """What an action means. A subclass has `numbers` and writes `command`, `likely` and `identity`."""
+
+    numbers: tuple[Number, ...]
+
+    @abstractmethod
+    def command(self, start: State, target: Array, action: Array) -> Command:
+        """The motor command of an action.
+
+        Args:
+            start: of the eyes.
+            target: desired orientations, (saccades, 4).
+            action: in units, (saccades, numbers).
+        """
+
+    @abstractmethod
+    def likely(self, target: Array) -> Array:
+        """Values near which the best action probably is, (saccades, numbers); NaN where nothing is known."""
+
+    @abstractmethod
+    def identity(self) -> dict[str, Any]:
+        """What makes these actions these ones, in plain values: `actions`, their kind, and its options."""
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the numbers: symbols, of several motors B_motor1, B_motor2, ..."""
+        several = len({number.motor for number in self.numbers}) > 1
+        return tuple(f"{n.symbol}_{n.motor}" if several and n.motor else n.symbol for n in self.numbers)
+
+    @cached_property
+    def low(self) -> Array:
+        """Lower bounds, (numbers,)."""
+        return np.array([number.low for number in self.numbers])
+
+    @cached_property
+    def high(self) -> Array:
+        """Upper bounds, (numbers,)."""
+        return np.array([number.high for number in self.numbers])
+
+    @cached_property
+    def log(self) -> NDArray[np.bool_]:
+        """Which are on a logarithmic scale, (numbers,)."""
+        return np.array([number.log for number in self.numbers])
+
+    def from_unit(self, scaled: ArrayLike) -> Array:
+        """Actions in units from -1 .. 1, (saccades, numbers); what is beyond is cut off."""
+        return scale(scaled, self.low, self.high, self.log)
+
+    def to_unit(self, action: Array) -> Array:
+        """The inverse of `from_unit`."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            linear = (action - self.low) / (self.high - self.low)
+            if not self.log.any():
+                return np.asarray(2 * linear - 1)
+            low, high = np.where(self.log, self.low, 1), np.where(self.log, self.high, np.e)
+            logarithmic = np.log(np.where(self.log, action, 1) / low) / np.log(high / low)
+        return np.asarray(2 * np.where(self.log, logarithmic, linear) - 1)
+
+
+def scale(scaled: ArrayLike, low: Array, high: Array, log: NDArray[np.bool_]) -> Array:
+    """Values between bounds (numbers,) from -1 .. 1 (..., numbers), on a linear or a logarithmic scale."""
+    shares = (np.clip(np.asarray(scaled, float), -1, 1) + 1) / 2
+    linear = low + shares * (high - low)
+    if not log.any():
+        return np.asarray(linear)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.where(log, low * (high / low) ** shares, linear))
+
+
+class PulseStepActions(ActionSpace):
+    """B, D and k0 of a pulse-step for each driven motor (thesis 4.2, 4.3).
+
+    Args:
+        plant: whose motors are commanded.
+        driven: motors that the action commands; the others stay where they are.
+        pulse: a name of `orient_eye.commands.pulses.PULSES`.
+        C: onset rate [1/s] of a pulse that has one; None for the thesis' fixed value, "varying" for the one that
+            brings the motor to the speed limit.
+        speed_limit: V [deg/s], for a varying C.
+
+    Raises:
+        InputError: motors the plant has not, an unknown pulse, a C that is none, or a speed limit that is none.
+    """
+
+    kind = "pulse-step"
+
+    def __init__(
+        self,
+        plant: Plant,
+        driven: Sequence[str],
+        pulse: str = "1",
+        C: float | str | None = None,
+        speed_limit: float = SPEED_LIMIT,
+    ) -> None:
+        self.plant, self.driven, self.pulse, self.speed_limit = plant, tuple(driven), pulse, speed_limit
+        self.index = check_driven(plant.motors, driven, plant.name)
+        onset = PULSES[pulse].onset
+        if isinstance(C, str) and C != "varying":
+            raise InputError(f"C is a number [1/s], 'varying' or nothing, got {C!r}")
+        if onset is None and C is not None:
+            raise InputError(f"pulse {pulse!r} has no onset rate C; leave C = {C} out")
+        if isinstance(C, (int, float)) and not 0 < C < np.inf:
+            raise InputError(f"C must be positive and finite, got {C}")
+        if not 0 < speed_limit < np.inf:
+            raise InputError(f"the speed limit must be positive and finite, got {speed_limit}")
+        self.C = onset.fixed if onset and C is None else C
+        rates = plant.pulse_rates or PulseRates(B_RANGE, K0_RANGE)
+        log = plant.pulse_rates is not None
+        self.numbers = tuple(
+            number
+            for motor in (plant.motors[i] for i in self.index)
+            for number in (
+                Number("B", "1/s", motor.name, *rates.B, log=log, difference=0.2, fine=0.05),
+                Number("D", motor.unit, motor.name, *_finite(motor.working), difference=0.02, fine=0.002),
+                Number("k0", "1/s", motor.name, *rates.k0, log=log, difference=0.05, fine=0.03, cliff=True),
+            )
+        )
+
+    def identity(self) -> dict[str, Any]:
+        """Kind, motors, pulse, C, speed limit where C varies, and bounds; their scale follows from the plant."""
+        return {
+            "actions": self.kind,
+            "driven": list(self.driven),
+            "pulse": self.pulse,
+            "C": self.C,
+            "speed_limit": self.speed_limit if self.C == "varying" else None,
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+        }
+
+    def command(self, start: State, target: Array, action: Array) -> PulseStep:
+        """A pulse-step of all motors; those that are not driven are told to stay."""
+        each = np.asarray(action, float).reshape(len(start), len(self.index), 3)
+        F, shape = start.motor, start.motor.shape
+        B, D, k0 = np.ones(shape), F.copy(), np.ones(shape)
+        for values, column in ((B, 0), (D, 1), (k0, 2)):
+            values[:, self.index] = each[..., column]
+        if self.C != "varying":
+            return PulseStep(F, B, D, k0, self.pulse, self.C)
+        pulse = PULSES[self.pulse]
+        C = varying_C(pulse, D - F, B, k0, self.speed_limit)
+        keeps = keeps_speed_limit(pulse, D - F, B, k0, self.speed_limit)[:, self.index]
+        return PulseStep(F, B, D, k0, self.pulse, C, too_fast=np.asarray(~keeps.all(axis=1)))
+
+    def likely(self, target: Array) -> Array:
+        """D is near where the eye rests on the target."""
+        found = np.full((len(target), len(self.numbers)), np.nan)
+        found[:, 1::3] = self.plant.hold(target, self.driven)[:, self.index]
+        return found
+
+
+def _finite(working: tuple[float, float]) -> tuple[float, float]:
+    if not np.isfinite(working).all():
+        raise InputError(f"a motor that a policy drives needs a finite working range, got {working}")
+    return working
+
+
+ACTIONS: Registry[Callable[..., ActionSpace]] = Registry("action", {PulseStepActions.kind: PulseStepActions})
+"""Kind to class; each takes the plant, the driven motors, and options of its own."""
+
+
+def restore_actions(identity: dict[str, Any], plant: Plant) -> ActionSpace:
+    """The action space of an identity on a plant; its bounds are those of the plant."""
+    options = {k: v for k, v in identity.items() if k not in ("actions", "low", "high") and v is not None}
+    return ACTIONS[str(identity["actions"])](plant, **options)

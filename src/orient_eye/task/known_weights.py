@@ -1,0 +1,183 @@
+"""The weights of a task whose owner gives none: shipped, remembered, or solved on its plant, and by what rule.
+
+    task = with_known_weights(task)
+    task.weights, task.weights_from                  # "solved by thesis 4.4.5 at B = 35, ..."
+
+In this order:
+
+1. Shipped in `models/weights.json`, for the plants of the thesis.
+2. Remembered in the user's cache, from an earlier solution.
+3. Thesis 4.4.5: the saccade of 30 deg with B = 35 and the k0 at which its overshoot sets in is optimal.
+4. Where that has no solution: 4.4.5 at the fastest saccade of 30 deg that overshoots by 1 % at most.
+5. Where that has none either, `by_rule`. So also, at once, on a plant with pulse rates of its own (a rig): B = 35 is
+   the thesis' choice for the thesis' eye, and where a motor is at its limits the equations are singular.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from platformdirs import user_cache_path
+
+from orient_eye.errors import InputError
+from orient_eye.files import write_text
+from orient_eye.resources import data_folder
+from orient_eye.task.solved_weights import ChosenSaccade, Resolved, Steps, action_of, resolve, solve_at
+
+if TYPE_CHECKING:
+    from orient_eye.task.saccade import Outcome, SaccadeTask
+
+Array = NDArray[np.float64]
+_RULE = "3"  # changes when what is below does
+OVERSHOOT = 0.01
+"""Overshoot that the reference saccade may have."""
+DURATION_SHARE = 2.9
+"""Weighted duration over weighted energy at the reference saccade, by `by_rule`: as at the thesis' own (4.4.5)."""
+OVERSHOOT_SHARE = 0.1
+"""What 1 % of overshoot costs by `by_rule`, in units of what the reference saccade costs: what stays within the
+settling band is cheap, what leaves it costs time."""
+WORTH = 2.0
+"""What standing still costs by `by_rule`, in units of what a saccade of 5 deg costs."""
+ERROR_DEG, ERROR_AT_DEG = 0.25, 5.0
+"""End-point error with which one can live, and the size of the saccade."""
+_GRID, _ROUNDS = 24, 4  # of the search of the fastest saccade
+
+
+def with_known_weights(task: SaccadeTask) -> SaccadeTask:
+    """The same task with weights, and words on where they are from.
+
+    Raises:
+        InputError: the plant makes no saccade by which weights could be set.
+    """
+    key = _key(task)
+    for entry in json.loads((data_folder("models") / "weights.json").read_text(encoding="utf-8")):
+        if entry["of"] == key:
+            return replace(task, weights=entry["weights"], weights_from=entry["from"])
+    name = hashlib.sha256(json.dumps({**key, "rule": _RULE}, sort_keys=True).encode()).hexdigest()[:24]
+    file = user_cache_path("orient-eye") / "weights" / f"{name}.json"
+    kept = _read(file, key)
+    if kept is None:
+        weights, where = solve(task)
+        kept = {"of": key, "weights": weights, "from": where}
+        with contextlib.suppress(InputError):  # a folder that cannot be written costs the next solution, nothing else
+            write_text(file, json.dumps(kept, indent=2) + "\n")
+    return replace(task, weights=kept["weights"], weights_from=kept["from"])
+
+
+def solve(task: SaccadeTask, error_deg: float | None = None) -> tuple[dict[str, float], str]:
+    """Weights solved on the task's plant, and where they are from, in words; steps 3 to 5 above."""
+    if task.plant.pulse_rates is not None or error_deg is not None:
+        return by_rule(task, ERROR_DEG if error_deg is None else error_deg)
+    try:
+        saccade = resolve(task, ChosenSaccade())
+        return solve_at(task, saccade, Steps()), f"solved by thesis 4.4.5 at {_told(task, saccade.action)}"
+    except InputError:
+        saccade, _ = fastest(task)
+    try:
+        weights = solve_at(task, saccade, Steps())
+        told = _told(task, saccade.action)
+        return weights, f"solved by thesis 4.4.5 at the fastest saccade with {OVERSHOOT:.0%} overshoot, {told}"
+    except InputError:
+        return by_rule(task)
+
+
+def fastest(task: SaccadeTask, size_deg: float | None = None) -> tuple[Resolved, Outcome]:
+    """The saccade that settles first with `OVERSHOOT` at most, by search over B and k0; D rests on the target.
+
+    Args:
+        task: its weights do not matter.
+        size_deg: of the saccade, from straight ahead; None for 30 deg or as far as the targets go.
+
+    Raises:
+        InputError: no saccade settles.
+    """
+    target = None if size_deg is None else (size_deg, *[0.0] * (len(task.targets.angles) - 1))
+    at = resolve(task, ChosenSaccade(target=target, k0=1.0))  # D is what is needed of it
+    D = at.chosen.D
+    assert D is not None
+    bounds = {n.symbol: (n.low, n.high) for n in task.actions.numbers}
+    window: dict[str, Array] = {name: np.log(bounds[name]) for name in ("B", "k0")}
+    best: Array = np.zeros(0)
+    for _ in range(_ROUNDS):
+        grids = (np.linspace(window[name][0], window[name][1], _GRID) for name in ("B", "k0"))
+        pairs = np.exp(np.stack([g.ravel() for g in np.meshgrid(*grids)], axis=1))
+        which = np.zeros(len(pairs), int)
+        actions = np.stack([action_of(task, B, D, k0) for B, k0 in pairs])
+        measures = task.perform(at.start[which], actions, at.target[which]).measures
+        late = np.where(measures.settled & ~measures.failed, measures.settling_time_s, np.inf)
+        cost = np.where(measures.overshoot <= OVERSHOOT, late, late + 10 + 1e3 * np.nan_to_num(measures.overshoot))
+        best = pairs[cost.argmin()]
+        if not np.isfinite(cost.min()):
+            raise InputError(
+                f"no pulse-step brings the eye of plant {task.plant.name!r} to rest within {task.horizon_s:g} s, so "
+                "its weights cannot be solved; give the weights"
+            )
+        for name, value in zip(("B", "k0"), best, strict=True):
+            half = 0.15 * (window[name][1] - window[name][0])
+            low, high = np.log(bounds[name])
+            window[name] = np.clip([np.log(value) - half, np.log(value) + half], low, high)
+    action = action_of(task, float(best[0]), D, float(best[1]))
+    found = replace(at, action=action, chosen=replace(at.chosen, B=float(best[0]), k0=float(best[1])))
+    return found, task.perform(found.start, action[None], found.target)
+
+
+def by_rule(task: SaccadeTask, error_deg: float = ERROR_DEG) -> tuple[dict[str, float], str]:
+    """Weights in stated proportions at the fastest saccades, and where they are from, in words.
+
+    The reference is the fastest saccade of 30 deg, or as far as the targets go. Energy has weight 1. The duration of
+    the reference weighs `DURATION_SHARE` times its energy, and 1 % of overshoot `OVERSHOOT_SHARE` times both. The
+    accuracy weighs as much as the largest of these demands:
+
+    - A saccade of 5 deg, and the reference, end `error_deg` short where energy saved and accuracy lost balance: energy
+      E grows with the square of the amplitude a, so its slope is 2 E / a, and that of lambda_a sin^2(d / 2) is
+      lambda_a d / 2 [rad].
+    - A saccade of 5 deg is worth its cost `WORTH` times over: else the best is not to move.
+
+    Raises:
+        InputError: a reward with other terms than the thesis', or no saccade that settles.
+    """
+    if not 0 < error_deg < 90:
+        raise InputError(f"the end-point error that one can live with is positive, got {error_deg} deg")
+    saccade, large = fastest(task)
+    _, small = fastest(task, min(ERROR_AT_DEG, task.targets.limit_deg))
+    if set(large.reward.terms) != {"accuracy", "energy", "duration", "overshoot"}:
+        raise InputError(f"no rule sets the weights of {', '.join(large.reward.terms)}; give the weights")
+    terms = [{name: float(-value[0]) for name, value in o.reward.terms.items()} for o in (small, large)]
+    moved = [float(np.deg2rad(o.measures.amplitude_deg[0])) for o in (small, large)]
+    duration = DURATION_SHARE * terms[1]["energy"] / terms[1]["duration"]
+    balance = max(4 * t["energy"] / (a * np.deg2rad(error_deg)) for t, a in zip(terms, moved, strict=True))
+    worth = WORTH * (terms[0]["energy"] + duration * terms[0]["duration"]) / np.sin(moved[0] / 2) ** 2
+    weights = {
+        "accuracy": float(max(balance, worth)),
+        "energy": 1.0,
+        "duration": duration,
+        "overshoot": OVERSHOOT_SHARE * (1 + DURATION_SHARE) * terms[1]["energy"] / 0.01,
+    }
+    return weights, f"by rule (docs/weights.md) at the fastest saccade, {_told(task, saccade.action)}"
+
+
+def _key(task: SaccadeTask) -> dict[str, Any]:
+    """What the weights of a task depend on, in plain values."""
+    identity = task.identity()
+    actions = {key: value for key, value in identity["actions"].items() if key not in ("low", "high")}
+    kept = {key: identity[key] for key in ("plant", "judge", "band")}
+    return {**kept, "actions": actions, "targets": task.targets.name}
+
+
+def _read(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
+    try:
+        kept: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return kept if kept["of"] == key and isinstance(kept["from"], str) and kept["weights"] else None
+    except (OSError, ValueError, KeyError, TypeError):  # none, or damaged: solve again
+        return None
+
+
+def _told(task: SaccadeTask, action: Array) -> str:
+    return ", ".join(f"{name} = {value:.4g}" for name, value in zip(task.actions.names, action, strict=True))

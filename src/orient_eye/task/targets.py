@@ -1,0 +1,239 @@
+"""Where saccades start and where they go: orientations, drawn by a set of targets made for a plant.
+
+    targets = make_targets("horizontal", plant)
+    start, target = targets.draw(100, random)        # State, orientations (saccades, 4)
+    start, target = targets.saccades([[0.0]], [[20.0]])   # by angles [deg], (saccades, angles)
+
+Another set is a class with the members of `Targets` and a line in `TARGETS`.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from orient_eye import rotations
+from orient_eye.constants import YAW_LIMIT_DEG
+from orient_eye.errors import InputError
+from orient_eye.motor import check_driven, names
+from orient_eye.movement.measures import View
+from orient_eye.plants import Plant
+from orient_eye.state import State, unit
+from orient_eye.task.target_sets import TARGETS
+
+Array = NDArray[np.float64]
+
+
+class Targets(Protocol):
+    """A set of starts and targets.
+
+    Attributes:
+        name: key in `TARGETS`.
+        angles: what a direction is told by: column names with their unit, ("yaw_deg",).
+        driven: motors that can make these saccades.
+        of: what of a saccade counts, "orientation" or "gaze".
+        limit_deg: how far from straight ahead they are drawn.
+    """
+
+    name: str
+    angles: tuple[str, ...]
+    driven: tuple[str, ...]
+    of: View
+    limit_deg: float
+
+    def draw(self, count: int, random: np.random.Generator) -> tuple[State, Array]:
+        """Starts, which the plant can hold, and target orientations (count, 4)."""
+        ...
+
+    def orientation(self, angles: ArrayLike) -> Array:
+        """Orientations (saccades, 4) of directions told by angles (saccades, angles)."""
+        ...
+
+    def angles_of(self, orientation: Array) -> Array:
+        """Angles (saccades, angles) of orientations (saccades, 4)."""
+        ...
+
+    def rest(self, orientation: Array) -> State:
+        """Eyes at rest in these orientations (saccades, 4).
+
+        Raises:
+            InputError: an orientation that the driven motors cannot hold.
+        """
+        ...
+
+    def check(self, angles: Array, what: str, *, drawn: bool = False) -> None:
+        """Refuse directions (saccades, angles) that the plant cannot hold; if drawn, also those that are never drawn.
+
+        Raises:
+            InputError: says which, and what is allowed; `what` is "start" or "target".
+        """
+        ...
+
+    def of_sizes(self, size_deg: Array, starts: int) -> tuple[Array, Array]:
+        """Angles of starts and targets, each (n, angles): every size from points all over the range, both ways."""
+        ...
+
+    def symmetric(self, size_deg: Array) -> tuple[Array, Array]:
+        """Angles of starts and targets (sizes, angles) of one saccade of each size around straight ahead."""
+        ...
+
+    def identity(self) -> dict[str, Any]:
+        """What makes this set this one, in plain values: `targets`, its name, and its options."""
+        ...
+
+
+def saccades(targets: Targets, start: ArrayLike, target: ArrayLike) -> tuple[State, Array]:
+    """Chosen saccades, by the angles of their starts and targets [deg], each (saccades, angles).
+
+    Raises:
+        InputError: other shapes, or a start that the plant cannot hold.
+    """
+    angles = [np.asarray(a, dtype=float) for a in (start, target)]
+    shape = (len(angles[0]), len(targets.angles))
+    if any(a.shape != shape for a in angles):
+        raise InputError(
+            f"saccades among {targets.name} targets have starts and targets of shape (saccades, {shape[1]}: "
+            f"{', '.join(targets.angles)}), got {angles[0].shape} and {angles[1].shape}"
+        )
+    return targets.rest(targets.orientation(angles[0])), targets.orientation(angles[1])
+
+
+_AXES = {"yaw": 0, "pitch": 1, "roll": 2}
+_LEAST_DEG = 1e-3  # about the axis, a degree of motor
+_PURE = 0.05  # of what a motor turns about the axis, it may turn about the others
+_REACH = 0.98  # of what the plant can hold
+
+
+class AxisTargets:
+    """Rotations about one axis of the head, starts and targets drawn evenly from a range (thesis 4.6).
+
+    Args:
+        plant: for which they are made.
+        axis: "yaw", "pitch" or "roll".
+        limit_deg: of the range, to either side; less where the plant's motors do not reach it.
+        driven: motors to use; None for those that turn the eye about this axis alone, or where there is none for
+            all that turn it about this axis.
+
+    Raises:
+        InputError: no motor of the plant turns the eye about this axis.
+    """
+
+    of: View = "orientation"
+
+    def __init__(
+        self,
+        plant: Plant,
+        *,
+        name: str = "horizontal",
+        axis: str = "yaw",
+        limit_deg: float = YAW_LIMIT_DEG,
+        driven: tuple[str, ...] | None = None,
+    ) -> None:
+        self.plant, self.name, self.axis, self.angles = plant, name, axis, (f"{axis}_deg",)
+        self.driven = _turning(plant, axis) if driven is None else driven
+        if not self.driven:
+            raise InputError(f"no motor of plant {plant.name!r} turns the eye in {axis}; choose other targets")
+        if not 0 < limit_deg < 180:
+            raise InputError(f"the range of {name} targets lies between 0 and 180 deg, got {limit_deg}")
+        self.low, self.high = _held(plant, self.driven, axis)
+        self.limit_deg = float(min(limit_deg, _REACH * min(-self.low, self.high)))
+        if not self.limit_deg > _LEAST_DEG:
+            raise InputError(
+                f"motors {', '.join(self.driven)} of plant {plant.name!r} hold the eye between {self.low:.2f} and "
+                f"{self.high:.2f} deg of {axis}, not around straight ahead; choose other targets or motors"
+            )
+
+    def identity(self) -> dict[str, Any]:
+        """Name and range."""
+        return {"targets": self.name, "limit_deg": self.limit_deg}
+
+    def draw(self, count: int, random: np.random.Generator) -> tuple[State, Array]:
+        """See `Targets`."""
+        start, target = random.uniform(-self.limit_deg, self.limit_deg, (2, count, 1))
+        return self.rest(self.orientation(start)), self.orientation(target)
+
+    def orientation(self, angles: ArrayLike) -> Array:
+        """See `Targets`."""
+        return rotations.about(self.axis, np.asarray(angles, dtype=float)[:, 0])
+
+    def angles_of(self, orientation: Array) -> Array:
+        """See `Targets`."""
+        return rotations.to_euler(orientation)[_AXES[self.axis]][:, None]
+
+    def rest(self, orientation: Array) -> State:
+        """See `Targets`."""
+        orientation = unit(orientation)
+        return State(orientation, self.plant.hold(orientation, self.driven))
+
+    def check(self, angles: Array, what: str, *, drawn: bool = False) -> None:
+        """See `Targets`."""
+        low, high = (-self.limit_deg, self.limit_deg) if drawn else (self.low, self.high)
+        for value in angles[~((angles >= low) & (angles <= high))]:
+            can = "saccades are learned" if drawn else f"the eye of plant {self.plant.name!r} can be held"
+            raise InputError(
+                f"{what} at {value:g} deg: {can} between {low:.1f} and {high:.1f} deg of {self.axis}; choose an "
+                "angle in this range"
+            )
+
+    def of_sizes(self, size_deg: Array, starts: int) -> tuple[Array, Array]:
+        """See `Targets`; sizes that the range does not hold are left out."""
+        size_deg = size_deg[size_deg < 2 * self.limit_deg]
+        share, size = np.meshgrid(np.linspace(0, 1, starts), size_deg)
+        start = (-self.limit_deg + share * (2 * self.limit_deg - size)).ravel()
+        ends = start, start + size.ravel()
+        return np.concatenate(ends)[:, None], np.concatenate(ends[::-1])[:, None]
+
+    def symmetric(self, size_deg: Array) -> tuple[Array, Array]:
+        """See `Targets`; in the positive direction."""
+        half = np.asarray(size_deg, dtype=float)[:, None] / 2
+        half = half[(half <= self.limit_deg)[:, 0]]
+        return -half, half
+
+
+def _effect(plant: Plant) -> Array:
+    """Yaw, pitch and roll [deg] (motors, 3) by which a degree of each motor turns the eye from where it rests."""
+    at = plant.rest(np.concatenate([np.zeros((1, len(plant.motors))), np.eye(len(plant.motors))]))
+    turn = rotations.rotation(at[1:]) * rotations.rotation(at[0]).inv()
+    return np.stack(rotations.to_euler(turn.as_quat(scalar_first=True)), axis=-1)
+
+
+def _turning(plant: Plant, axis: str) -> tuple[str, ...]:
+    """Motors that turn the eye from rest about this axis alone, or failing that all that turn it about it."""
+    turned = np.abs(_effect(plant))
+    about = turned[:, _AXES[axis]]
+    others = np.delete(turned, _AXES[axis], axis=1).max(axis=1)
+    pure = (about > _LEAST_DEG) & (others < _PURE * about)
+    chosen = pure if pure.any() else about > np.maximum(_LEAST_DEG, _PURE * others)
+    return tuple(name for name, is_chosen in zip(names(plant.motors), chosen, strict=True) if is_chosen)
+
+
+def _held(plant: Plant, driven: tuple[str, ...], axis: str) -> tuple[float, float]:
+    """Least and largest angle at which the driven motors can hold the eye inside their working range."""
+    motor, effect = np.zeros((33, len(plant.motors))), _effect(plant)[:, _AXES[axis]]
+    for index in check_driven(plant.motors, driven, plant.name):
+        low, high = plant.motors[index].working
+        sweep = np.linspace(max(low, -1e3), min(high, 1e3), len(motor))
+        motor[:, index] = sweep if effect[index] > 0 else sweep[::-1]
+    held = np.unwrap(rotations.to_euler(plant.rest(motor))[_AXES[axis]], period=360)
+    held = held - 360 * np.round(held[len(held) // 2] / 360)  # straight ahead is in the middle
+    return max(float(held.min()), -179.0), min(float(held.max()), 179.0)
+
+
+def vertical(plant: Plant, **options: Any) -> AxisTargets:
+    """Rotations up and down; options as those of `AxisTargets`."""
+    return AxisTargets(plant, name="vertical", axis="pitch", **options)
+
+
+def make_targets(name: str, plant: Plant, **options: Any) -> Targets:
+    """The set of that name for a plant.
+
+    Raises:
+        InputError: unknown, or nothing that this plant can do.
+    """
+    return TARGETS[name](plant, **options)
+
+
+def restore_targets(identity: dict[str, Any], plant: Plant, driven: tuple[str, ...]) -> Targets:
+    """The set of an identity, for a plant."""
+    options = {key: value for key, value in identity.items() if key != "targets"}
+    return make_targets(str(identity["targets"]), plant, driven=driven, **options)
