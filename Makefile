@@ -34,8 +34,8 @@ test: $(INSTALLED)
 	$(BIN)/python -m pytest $(COVERAGE)
 
 check: $(INSTALLED)
-	$(BIN)/ruff check src tests scripts benchmarks
-	$(BIN)/ruff format --check src tests scripts benchmarks
+	$(BIN)/ruff check src tests scripts benchmarks examples
+	$(BIN)/ruff format --check src tests scripts benchmarks examples
 	$(BIN)/mypy
 
 bench: $(INSTALLED)

@@ -8,24 +8,27 @@ import stat
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from orient_eye.commands.motor_file import read_command, rest_position
+from orient_eye.commands.motor_file import WrittenCommand, read_command, write_command
 from orient_eye.errors import InputError
 from orient_eye.files import remove_leftovers, write_atomically, write_table, write_text
-from orient_eye.movement.trajectory import Trajectory, concatenate, motor_column
+from orient_eye.motor import Motor
+from orient_eye.movement.trajectory import Trajectory, concatenate
 from orient_eye.plants import Plant, make_plant
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.rotations import from_yaw
-from orient_eye.run_directory import RunDirectory
+from orient_eye.run_directory import RunDirectory, versions
 from orient_eye.surrogate import Surrogate
 
 Array = NDArray[np.float64]
@@ -53,14 +56,25 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
+def told(path: Path, plant: Plant, horizon_s: float | None = None) -> Array:
+    """What a plant tells its motors when it performs the file, (time, motors)."""
+    return plant.move(read_command(path, plant.motors), horizon_s=horizon_s).trajectory().command[0]
+
+
 def test_command_is_straight_lines_at_the_plants_step(tmp_path: Path, eye: Plant) -> None:
     path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.0105,0,11.5,-3\n0.02,5,11.5,0\n")
-    command = read_command(path, eye)
-    assert command.shape == (1, 21, 3)
-    t = 0.001 * np.arange(21)
+    command = read_command(path, eye.motors)
+    assert (len(command), command.duration_s, command.saturates) == (1, 0.02, False)
     knots = [0, 0.0105, 0.02]
-    expected = [np.interp(t, knots, values) for values in ([0, 0, 5], [1, 11.5, 11.5], [0, -3, 0])]
-    np.testing.assert_allclose(command[0].T, expected, rtol=0, atol=1e-12)
+    for step_s, samples in ((0.001, 21), (0.0002, 101), (0.0007, 50)):
+        t = step_s * np.arange(samples)
+        expected = [np.interp(t, knots, values) for values in ([0, 0, 5], [1, 11.5, 11.5], [0, -3, 0])]
+        sampled = command.sample(step_s, samples)
+        assert sampled.shape == (1, samples, 3)
+        np.testing.assert_allclose(sampled[0].T, expected, rtol=0, atol=1e-12)
+    moved = eye.move(command).trajectory()
+    np.testing.assert_allclose(moved.time, 0.001 * np.arange(21), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(moved.command, command.sample(0.001, 21))
 
 
 @settings(deadline=None, max_examples=40, derandomize=True)
@@ -72,13 +86,10 @@ def test_command_is_straight_lines_at_the_plants_step(tmp_path: Path, eye: Plant
 def test_uneven_sampling(tmp_path_factory: pytest.TempPathFactory, gaps: list[float], start: float, seed: int) -> None:
     """Any sampling, from any time on: numpy's interpolation of the same rows."""
     t = start + np.concatenate([[0], np.cumsum(gaps)])
+    assume(t[-1] - t[0] >= 2e-3)
     tau = np.random.default_rng(seed).uniform(-40, 40, len(t))
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(t.tolist(), tau.tolist(), strict=True))
-    path = write(tmp_path_factory.mktemp("csv"), f"t_s,tau2_deg\n{rows}\n")
-    plant = LinearPlant()
-    if t[-1] - t[0] < 2e-3:
-        return
-    command = read_command(path, plant)[0, :, 0]
+    command = told(write(tmp_path_factory.mktemp("csv"), f"t_s,tau2_deg\n{rows}\n"), LinearPlant())[:, 0]
     assert len(command) == round((t[-1] - t[0]) / 0.001) + 1
     at = t[0] + 0.001 * np.arange(len(command))
     np.testing.assert_allclose(command, np.interp(at, t, tau), rtol=0, atol=1e-7)
@@ -88,53 +99,87 @@ def test_jumps(tmp_path: Path) -> None:
     """Two rows at one time: the later holds from that time on; the first row is the rest before it."""
     path = write(tmp_path, "t_s,tau2_deg\n0,5\n0,20\n0.003,20\n0.003,7\n0.003,8\n0.0055,8\n0.0055,-1\n0.008,-1\n")
     plant = LinearPlant()
-    np.testing.assert_array_equal(read_command(path, plant)[0, :, 0], [20, 20, 20, 8, 8, 8, -1, -1, -1])
-    np.testing.assert_array_equal(rest_position(path, plant), [[5]])
+    np.testing.assert_array_equal(told(path, plant)[:, 0], [20, 20, 20, 8, 8, 8, -1, -1, -1])
+    command = read_command(path, plant.motors)
+    np.testing.assert_array_equal(command.rest, [[5]])
+    np.testing.assert_array_equal(command.final, [[-1]])
 
 
 def test_the_last_row_is_held_and_the_horizon_cuts(tmp_path: Path) -> None:
     path = write(tmp_path, "t_s,tau2_deg\n0,0\n0.004,8\n")
     plant = LinearPlant()
-    np.testing.assert_allclose(read_command(path, plant, horizon_s=0.006)[0, :, 0], [0, 2, 4, 6, 8, 8, 8], atol=1e-9)
-    np.testing.assert_allclose(read_command(path, plant, horizon_s=0.002)[0, :, 0], [0, 2, 4], atol=1e-9)
-    one_row = write(tmp_path, "t_s,tau2_deg\n0,12\n")
-    np.testing.assert_array_equal(read_command(one_row, plant, horizon_s=0.003)[0, :, 0], [12] * 4)
+    np.testing.assert_allclose(told(path, plant, 0.006)[:, 0], [0, 2, 4, 6, 8, 8, 8], atol=1e-9)
+    np.testing.assert_allclose(told(path, plant, 0.002)[:, 0], [0, 2, 4], atol=1e-9)
+    still = write(tmp_path, "t_s,tau2_deg\n0,12\n0.001,12\n")
+    np.testing.assert_array_equal(told(still, plant, 0.003)[:, 0], [12] * 4)
+
+
+def test_energy_of_a_written_command() -> None:
+    """Of straight lines the sum of step^2 / duration, over all motors."""
+    command = WrittenCommand(np.array([0, 0.01, 0.05]), np.array([[0.0, 1.0], [5.0, 1.0], [-5.0, 3.0]]))
+    np.testing.assert_allclose(command.energy(), [25 / 0.01 + 100 / 0.04 + 4 / 0.04], rtol=1e-9)
+    assert command.too_fast.tolist() == [False]
 
 
 def test_columns_in_any_order_and_motors_left_out(tmp_path: Path, eye: Plant) -> None:
     path = write(tmp_path, "tau3_deg, t_s ,tau1_deg\n1,0,4\n2,0.001,5\n")
-    np.testing.assert_array_equal(read_command(path, eye), [[[4, 0, 1], [5, 0, 2]]])
-    np.testing.assert_array_equal(rest_position(path, eye), [[4, 0, 1]])
+    np.testing.assert_array_equal(told(path, eye), [[4, 0, 1], [5, 0, 2]])
+    command = read_command(path, eye.motors)
+    np.testing.assert_array_equal(command.rest, [[4, 0, 1]])
+    np.testing.assert_array_equal(command.final, [[5, 0, 2]])
+
+
+def test_columns_are_named_as_the_motors(tmp_path: Path) -> None:
+    path = write(tmp_path, "t_s,servo_mm,tau12_deg\n0,1,2\n0.5,3,4\n")
+    motors = (Motor("motor12"), Motor("servo", "mm"))
+    np.testing.assert_array_equal(read_command(path, motors).positions, [[2, 1], [4, 3]])
+    with pytest.raises(InputError, match=r"cannot be commanded by servo_mm; its columns are t_s, tau12_deg "):
+        read_command(path, motors[:1])
 
 
 def test_a_motor_the_plant_lacks_may_stand_at_0(tmp_path: Path) -> None:
     path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.001,0,2,0\n")
-    np.testing.assert_array_equal(read_command(path, LinearPlant()), [[[1], [2]]])
+    np.testing.assert_array_equal(told(path, LinearPlant()), [[1], [2]])
     path = write(tmp_path, "t_s,tau1_deg,tau2_deg,tau3_deg\n0,0,1,0\n0.001,0,2,0.5\n")
-    with pytest.raises(InputError, match=r"'lpf' cannot be commanded by tau3_deg; its columns are t_s, tau2_deg"):
-        read_command(path, LinearPlant())
+    message = r"this plant cannot be commanded by tau3_deg; its columns are t_s, tau2_deg \(.* must be 0\)"
+    with pytest.raises(InputError, match=message):
+        read_command(path, LinearPlant().motors)
 
 
 def test_spreadsheets_byte_order_mark_and_blank_lines(tmp_path: Path) -> None:
     path = tmp_path / "command.csv"
     path.write_bytes("\ufefft_s,tau2_deg\r\n0,1\r\n\r\n0.001,2\r\n\r\n".encode())
-    np.testing.assert_array_equal(read_command(path, LinearPlant()), [[[1], [2]]])
+    np.testing.assert_array_equal(told(path, LinearPlant()), [[1], [2]])
+    path.write_bytes("t_s;tau2_deg\r\n0;1,5\r\n0,001;2\r\n".encode("utf-16"))
+    np.testing.assert_array_equal(told(path, LinearPlant()), [[1.5], [2]])
+
+
+def test_a_written_command_is_read_again(tmp_path: Path, eye: Plant) -> None:
+    time, positions = np.array([0, 0, 0.125, 0.5]), np.array([[1.5, 0, 2], [0, 0, 1], [3, 1, 2], [4, -5, 0.25]])
+    path = write_command(tmp_path / "new" / "command.csv", eye.motors, time, positions)
+    command = read_command(path, eye.motors)
+    np.testing.assert_array_equal(command.time, time)
+    np.testing.assert_array_equal(command.positions, positions)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"needs a header \(t_s,tau1_deg,tau2_deg,tau3_deg\) and at least one row"),
-        ("t_s,tau2_deg\n", "at least one row of numbers"),
-        ("time,tau2_deg\n0,1\n1,2\n", r"has the columns time, tau2_deg; .*needs t_s \[s\]"),
-        ("t_s,tau2_deg\n0,1\n0.1,abc\n", r"line 3: .*'abc'; every value is a number"),
-        ("t_s,tau2_deg\n0,1\n0.1\n", r"line 3: needs 2 finite numbers, got \['0.1'\]"),
-        ("t_s,tau2_deg\n0,1,9\n0.1,2,9\n", "line 2: needs 2 finite numbers"),
-        ("t_s,tau2_deg\n0,1\n0.1,nan\n", "line 3: needs 2 finite numbers"),
-        ("t_s,tau2_deg\n0,inf\n0.1,2\n", "line 2: needs 2 finite numbers"),
-        ("t_s,tau2_deg\n0,1\n0.2,2\n0.1,2\n", "line 4: t_s goes back; sort the rows by time"),
+        ("", r"is empty; it needs a header \(t_s,tau1_deg,tau2_deg,tau3_deg\) and rows of numbers"),
+        ("t_s,tau2_deg\n", "has no rows of numbers below its header; the header reads t_s, tau2_deg"),
+        ("time,tau2_deg\n0,1\n1,2\n", r"has the columns time, tau2_deg; it needs t_s \[s\] and tau1_deg, tau2"),
+        ("0,1\n1,2\n", "begins with numbers; its first line must name the columns: t_s,tau1_deg"),
+        ("t_s,tau2_deg\n0,1\n0.1,abc\n", r"line 3: tau2_deg is 'abc', not a number"),
+        ("t_s,tau2_deg\n0,1\n0.1\n", r"line 3: 1 cells, but there are 2 columns \(t_s, tau2_deg\)"),
+        ("t_s,tau2_deg\n0,1,9\n0.1,2,9\n", "line 2: 3 cells, but there are 2 columns"),
+        ("t_s,tau2_deg\n0,1\n0.1,nan\n", "line 3: tau2_deg is not a finite number; mend that row"),
+        ("t_s,tau2_deg\n0,1\n0.1,\n", "line 3: tau2_deg is not a finite number"),
+        ("t_s,tau2_deg\n0,inf\n0.1,2\n", "line 2: tau2_deg is not a finite number"),
+        ("t_s,tau2_deg\n0,1\n-inf,2\n", "line 3: t_s is not a finite number"),
+        ("t_s,tau2_deg,tau7_deg\n0,1,0\n0.1,2,\n", "line 3: tau7_deg is not a finite number"),
+        ("t_s,tau2_deg\n0,1\n0.2,2\n0.1,2\n", "line 4: time must rise .* t_s = 0.1 follows 0.2; sort the rows"),
         ("t_s,tau2_deg,tau2_deg\n0,1,1\n0.1,2,2\n", "a column stands twice in the header t_s, tau2_deg, tau2_deg"),
-        ("t_s,tau7_deg\n0,1\n0.1,2\n", r"'mujoco' cannot be commanded by tau7_deg; its columns are t_s, tau1"),
+        ("t_s,tau7_deg\n0,1\n0.1,2\n", r"cannot be commanded by tau7_deg; its columns are t_s, tau1"),
         ("t_s,velocity\n0,0\n0.1,0\n", "cannot be commanded by velocity"),
         ("t_s\n0\n0.1\n", "commands no motor; add a column, one of tau1_deg, tau2_deg, tau3_deg"),
         ("t_s,tau7_deg\n0,0\n0.1,0\n", "commands no motor"),
@@ -145,33 +190,36 @@ def test_spreadsheets_byte_order_mark_and_blank_lines(tmp_path: Path) -> None:
 def test_bad_command_files_are_refused(tmp_path: Path, eye: Plant, text: str, message: str) -> None:
     path = write(tmp_path, text)
     with pytest.raises(InputError, match=message):
-        read_command(path, eye)
+        read_command(path, eye.motors)
 
 
 def test_every_error_names_the_file(tmp_path: Path, eye: Plant) -> None:
     for text in ("", "time\n0\n", "t_s,tau2_deg\n0,x\n", "t_s,tau7_deg\n0,1\n1,1\n", "t_s\n0\n1\n"):
         path = write(tmp_path, text)
         with pytest.raises(InputError, match=r"command\.csv"):
-            read_command(path, eye)
+            read_command(path, eye.motors)
 
 
 def test_line_numbers_count_blank_lines(tmp_path: Path, eye: Plant) -> None:
     """The number is the editor's, so that the line is found."""
     with pytest.raises(InputError, match="line 5"):
-        read_command(write(tmp_path, "t_s,tau2_deg\n\n0,1\n\n0.1,abc\n"), eye)
-    with pytest.raises(InputError, match="line 6: t_s goes back"):
-        read_command(write(tmp_path, "t_s,tau2_deg\n\n0,1\n0.2,1\n\n0.1,1\n"), eye)
+        read_command(write(tmp_path, "t_s,tau2_deg\n\n0,1\n\n0.1,abc\n"), eye.motors)
+    with pytest.raises(InputError, match="line 6: time must rise"):
+        read_command(write(tmp_path, "t_s,tau2_deg\n\n0,1\n0.2,1\n\n0.1,1\n"), eye.motors)
 
 
 def test_files_that_cannot_be_read(tmp_path: Path, eye: Plant) -> None:
     with pytest.raises(InputError, match=r"cannot read .*nowhere\.csv"):
-        read_command(tmp_path / "nowhere.csv", eye)
+        read_command(tmp_path / "nowhere.csv", eye.motors)
     with pytest.raises(InputError, match="cannot read"):
-        read_command(tmp_path, eye)
+        read_command(tmp_path, eye.motors)
     binary = tmp_path / "binary.csv"
-    binary.write_bytes(b"\xff\xfe\x00\x01" * 50)
-    with pytest.raises(InputError, match=r"cannot read .*binary\.csv"):
-        read_command(binary, eye)
+    binary.write_bytes(b"\x93NUMPY\x01\x00" * 50)
+    with pytest.raises(InputError, match=r"cannot read .*binary\.csv: .*; give a text file"):
+        read_command(binary, eye.motors)
+    binary.write_bytes(b"\xff\xfe\x00\x01" * 50)  # begins as UTF-16 does
+    with pytest.raises(InputError, match=r"binary\.csv has no rows"):
+        read_command(binary, eye.motors)
 
 
 # --- trajectories ---------------------------------------------------------------------------------
@@ -183,7 +231,12 @@ def trajectory(saccades: int = 3) -> Trajectory:
     command = np.tile(np.linspace(0, 9, 12)[None, :, None], (saccades, 1, 3))
     if saccades > 1:
         command[-1, 5, 0] = np.nan
-    return plant.simulate(command)
+    return plant.move(command).trajectory()
+
+
+def flat(saccades: int, samples: int, step_s: float = 0.001) -> Trajectory:
+    """Of a plant without tendons."""
+    return LinearPlant(step_s=step_s).move(np.ones((saccades, samples, 1))).trajectory()
 
 
 def same(one: Trajectory, other: Trajectory) -> None:
@@ -196,16 +249,27 @@ def same(one: Trajectory, other: Trajectory) -> None:
             assert found == value
 
 
+def as_stored(one: Trajectory) -> Trajectory:
+    """Of the motors, names and units are kept."""
+    return replace(one, motors=tuple(Motor(motor.name, motor.unit) for motor in one.motors))
+
+
+def test_units_of_motors_are_kept(tmp_path: Path) -> None:
+    one = replace(flat(1, 5), motors=(Motor("servo", "mm"),))
+    assert Trajectory.load_npz(one.save_npz(tmp_path / "servo.npz")).motors == one.motors
+
+
 @pytest.mark.parametrize("kind", ["tendons", "none"])
 def test_trajectory_npz_round_trip(tmp_path: Path, kind: str) -> None:
     """Bit for bit, failed saccades included, and nothing that needs pickle."""
-    one = trajectory() if kind == "tendons" else LinearPlant().simulate(np.ones((2, 5, 1)))
+    one = trajectory() if kind == "tendons" else flat(2, 5)
     path = one.save_npz(tmp_path / "new" / "folder" / "saccades.npz")
     assert path == tmp_path / "new" / "folder" / "saccades.npz"
-    same(one, Trajectory.load_npz(path))
+    same(as_stored(one), Trajectory.load_npz(path))
+    absent = {"motors"} if one.tension is not None else {"motors", "tension"}
     with np.load(path, allow_pickle=False) as file:
-        assert {name: file[name].dtype.kind for name in file.files}
-        assert set(file.files) == set(vars(one)) - ({"tension"} if one.tension is None else set())
+        assert set(file.files) == set(vars(one)) - absent | {"motor_names", "motor_units"}
+        assert "O" not in {file[name].dtype.kind for name in file.files}
     assert [p.name for p in path.parent.iterdir()] == ["saccades.npz"]
 
 
@@ -213,35 +277,39 @@ def test_npz_under_any_name(tmp_path: Path) -> None:
     """The file has the name that was asked for, whatever its ending, and lies there alone."""
     one = trajectory()
     path = one.save_npz(tmp_path / "saccades")
-    same(one, Trajectory.load_npz(path))
+    same(as_stored(one), Trajectory.load_npz(path))
     assert [p.name for p in tmp_path.iterdir()] == ["saccades"]
 
 
 def test_trajectory_csv_round_trip(tmp_path: Path) -> None:
     one = trajectory()[0]
+    one = replace(one, command=one.command + 0.5)  # so that it stands apart from the motors
     path = one.to_csv(tmp_path / "trajectory.csv")
     lines = path.read_text(encoding="utf-8").splitlines()
     assert lines[0] == (
         "t_s,q_w,q_x,q_y,q_z,yaw_deg,pitch_deg,roll_deg,omega_x_deg_s,omega_y_deg_s,omega_z_deg_s,"
-        "tau1_deg,tau2_deg,tau3_deg,tension_motor1_upper_N,tension_motor1_lower_N,tension_motor2_right_N,"
+        "tau1_deg,tau2_deg,tau3_deg,command_tau1_deg,command_tau2_deg,command_tau3_deg,tension_motor1_upper_N,tension_motor1_lower_N,tension_motor2_right_N,"
         "tension_motor2_left_N,tension_motor3_upper_N,tension_motor3_lower_N"
     )
     table = np.genfromtxt(path, delimiter=",", names=True)
     assert len(table) == len(one.time)
     assert one.tension is not None
     expected = [one.time, *one.orientation[0].T, one.yaw_deg[0], one.pitch_deg[0], one.roll_deg[0]]
-    expected += [*one.angular_velocity[0].T, *one.motor[0].T, *one.tension[0].T]
+    expected += [*one.angular_velocity[0].T, *one.motor[0].T, *one.command[0].T, *one.tension[0].T]
     for name, column in zip(table.dtype.names, expected, strict=True):
         np.testing.assert_allclose(table[name], column, rtol=1e-8, atol=1e-12, err_msg=name)
 
 
 def test_a_trajectorys_csv_is_a_command(tmp_path: Path) -> None:
     """Its tau columns can be simulated again: the rest of the columns is taken out first."""
-    one = LinearPlant().simulate(np.linspace(0, 9, 12)[None, :, None])
+    plant = LinearPlant()
+    one = plant.move(np.linspace(0, 9, 12)[None, :, None]).trajectory()
     lines = one.to_csv(tmp_path / "trajectory.csv").read_text(encoding="utf-8").splitlines()
-    keep = [lines[0].split(",").index(name) for name in ("t_s", motor_column("motor2"))]
+    keep = [lines[0].split(",").index(name) for name in ("t_s", Motor("motor2").column)]
     text = "\n".join(",".join(line.split(",")[i] for i in keep) for line in lines)
-    np.testing.assert_allclose(read_command(write(tmp_path, text), LinearPlant()), one.motor, atol=1e-7)
+    again = plant.move(read_command(write(tmp_path, text), plant.motors)).trajectory()
+    np.testing.assert_allclose(again.motor, one.motor, atol=1e-7)
+    np.testing.assert_allclose(again.orientation, one.orientation, atol=1e-9)
 
 
 def test_csv_of_a_batch_is_refused(tmp_path: Path) -> None:
@@ -293,13 +361,12 @@ def test_picking_and_joining_saccades() -> None:
     np.testing.assert_array_equal(one[1:].motor, one.motor[1:])
     np.testing.assert_array_equal(one[~one.failed].orientation, one.orientation[:2])
     same(one, concatenate([one[0], one[1:]]))
-    flat = LinearPlant().simulate(np.ones((2, 12, 1)))
-    same(concatenate([flat[0], flat[1]]), flat)
-    for other in (flat, LinearPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))):
+    without = flat(2, 12)
+    same(concatenate([without[0], without[1]]), without)
+    slower = flat(2, 12, step_s=0.002)
+    for first, other in ((one, without), (one, slower), (without, slower)):
         with pytest.raises(InputError, match="same plant and the same times"):
-            concatenate([one, other])
-    with pytest.raises(InputError, match="same plant and the same times"):
-        concatenate([flat, LinearPlant(step_s=0.002).simulate(np.ones((2, 12, 1)))])
+            concatenate([first, other])
 
 
 # --- atomic writes --------------------------------------------------------------------------------
@@ -516,6 +583,12 @@ for name in sys.argv[1:]:
     assert remove_leftovers(tmp_path) == remove_leftovers(tmp_path / "nowhere") == []
 
 
+def test_a_run_names_what_computes_and_what_stores_weights() -> None:
+    found = versions()
+    for package in ("mujoco", "numpy", "torch", "safetensors"):
+        assert found[package] == metadata.version(package)
+
+
 def test_table(tmp_path: Path) -> None:
     path = write_table(tmp_path / "table.csv", [{"a": 1, "b": "x,y"}, {"a": 2.5, "b": None}])
     assert path.read_bytes().replace(b"\r", b"") == b'a,b\n1,"x,y"\n2.5,\n'
@@ -543,7 +616,7 @@ writers = {
     "out.csv": lambda path: files.write_table(path, [{"noise": x} for x in noise]),
     "out.npz": lambda path: files.write_atomically(path, lambda file: np.savez(file, noise)),
     "out.png": lambda path: figures.save(figure, path),
-    "out.rrd": lambda path: record(path, LinearPlant().simulate(np.ones((2, 400, 1)))),
+    "out.rrd": lambda path: record(path, LinearPlant().move(np.ones((2, 400, 1))).trajectory()),
 }
 for name in writers:
     (folder / name).write_text("old")
@@ -597,7 +670,8 @@ def test_a_failed_trajectory_write_keeps_the_old_file(tmp_path: Path, monkeypatc
 
 
 def test_surrogate_round_trip(tmp_path: Path) -> None:
-    one = Surrogate(-1.23456789012345, 17.499999999999, "motor1", "a rig, Ünit 2", {"amplitudes": [1.0, 2.0], "n": 3})
+    details = {"amplitudes": [1.0, 2.0], "n": 3}
+    one = Surrogate(-1.23456789012345, 17.499999999999, "motor1", "a rig, Ünit 2", details=details)
     path = one.save(tmp_path / "surrogate.json")
     assert Surrogate.load(path) == Surrogate.load(str(path)) == one
     assert json.loads(path.read_text(encoding="utf-8"))["K"] == one.K
@@ -622,11 +696,11 @@ GOOD: dict[str, Any] = {"format": "orient-eye surrogate 1", "K": 1.4, "w0": 17.0
         "3",
         "null",
         "{}",
-        json.dumps(GOOD | {"format": "orient-eye surrogate 2"}),
+        json.dumps(GOOD | {"format": "orient-eye surrogate 3"}),
         json.dumps({k: v for k, v in GOOD.items() if k != "K"}),
-        json.dumps(GOOD | {"zeta": 0.7}),
+        json.dumps(GOOD | {"damping": 0.7}),
         json.dumps(GOOD | {"K": "1.4"}),
-        json.dumps(GOOD | {"w0": None}),
+        json.dumps(GOOD | {"w0": "17"}),
         "\ud800".encode("utf-8", "surrogatepass").decode("latin-1"),
     ],
 )
@@ -641,11 +715,19 @@ def test_files_that_are_no_surrogate_are_refused(tmp_path: Path, content: str) -
 
 @pytest.mark.parametrize("values", [{"K": 0}, {"w0": 0}, {"w0": -17.5}, {"K": float("nan")}, {"w0": float("inf")}])
 def test_impossible_surrogates_are_refused(tmp_path: Path, values: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=r"finite gain K != 0 and w0 > 0, got K = .*, w0 = "):
+    with pytest.raises(InputError, match=r"finite gain K != 0 and positive w0, or wn and zeta, got \{'K': .*, 'w0': "):
         Surrogate(**({"K": 1.4, "w0": 17.5} | values))
     path = tmp_path / "surrogate.json"
     path.write_text(json.dumps(GOOD | values), encoding="utf-8")
     with pytest.raises(InputError, match="finite gain"):
+        Surrogate.load(path)
+
+
+@pytest.mark.parametrize("values", [{"w0": None}, {"wn": 3.0}, {"zeta": 0.7}, {"wn": 3.0, "zeta": 0.7}])
+def test_a_surrogate_is_of_one_order(tmp_path: Path, values: dict[str, Any]) -> None:
+    path = tmp_path / "surrogate.json"
+    path.write_text(json.dumps(GOOD | values), encoding="utf-8")
+    with pytest.raises(InputError, match="a surrogate has w0, or wn and zeta, got"):
         Surrogate.load(path)
 
 
@@ -656,7 +738,7 @@ def test_a_missing_surrogate_is_refused(tmp_path: Path) -> None:
 
 
 def test_horizontal_orientations_of_the_csv_are_the_yaw(tmp_path: Path) -> None:
-    one = LinearPlant(Surrogate(1.0, 10.0)).simulate(np.full((1, 3, 1), 25.0))
+    one = LinearPlant(Surrogate(1.0, 10.0)).move(np.full((1, 3, 1), 25.0)).trajectory()
     table = np.genfromtxt(one.to_csv(tmp_path / "t.csv"), delimiter=",", names=True)
     np.testing.assert_allclose(table["yaw_deg"], 25, rtol=1e-8)
     np.testing.assert_allclose([table["q_w"][0], table["q_z"][0]], from_yaw(25.0)[[0, 3]], rtol=1e-8)

@@ -375,7 +375,8 @@ def test_view_refuses_what_it_cannot_show(recorded: Path, tmp_path: Path, monkey
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
     for view, message in (
-        (View(tmp_path / "missing.rrd"), "does not exist"),
+        (View(tmp_path / "missing.rrd"), r"cannot read .*missing\.rrd: No such file .*; orient-eye simulate writes"),
+        (View(tmp_path), "is a folder; name the recording in it"),
         (View(text), "not a recording"),
         (View(recorded), "--screenshot"),
         (View(recorded, screenshot=tmp_path / "eye.jpg"), r"NAME\.png"),

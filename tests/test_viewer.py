@@ -22,7 +22,7 @@ RECORD = """
 import sys, numpy as np
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.recording import record
-record(sys.argv[1], LinearPlant().simulate(np.ones((1, 20, 1))))
+record(sys.argv[1], LinearPlant().move(np.ones((1, 20, 1))).trajectory())
 """
 
 

@@ -21,7 +21,9 @@ from typing import Any
 from orient_eye.errors import InputError
 from orient_eye.files import explained, write_text
 
-_PACKAGES = ("orient-eye", "mujoco", "numpy", "scipy", "gymnasium", "stable-baselines3", "torch", "rerun-sdk")
+_PACKAGES = (
+    "orient-eye", "mujoco", "numpy", "scipy", "gymnasium", "stable-baselines3", "torch", "safetensors", "rerun-sdk",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

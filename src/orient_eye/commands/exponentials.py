@@ -119,16 +119,18 @@ class Modes:
         shape = np.broadcast_shapes(*(m.p.shape for m in self.modes), t.shape[:-1])
         by_row = Modes(tuple(Mode(*(_by_row(x, shape) for x in (m.p, m.a))) for m in self.modes))
         times = np.broadcast_to(t, (*shape, t.shape[-1])).reshape(-1, t.shape[-1])
+        if times.size * len(self.modes) * _ORDERS <= _CHUNK:
+            values = by_row._jet(times, derivatives, None)
+            return tuple(np.moveaxis(values, 1, 0).reshape(derivatives + 1, *shape, t.shape[-1]))
         values = np.empty((len(times), derivatives + 1, t.shape[-1]))
         # Rows with poles that nearly meet have long polynomials; the others need not carry them.
         long = np.zeros(len(times), bool)
         for m in by_row.modes:
             long |= (m.a[_SHORT:] != 0).any(axis=0)
-        for rows, orders in ((~long, _SHORT), (long, None)):
-            index = np.flatnonzero(rows)
+        for index, orders in ((np.flatnonzero(~long), _SHORT), (np.flatnonzero(long), None)):
             chunk = max(1, _CHUNK // max(1, t.shape[-1] * len(self.modes) * (1 if orders else _ORDERS)))
             for start in range(0, len(index), chunk):
-                part = index[start : start + chunk]
+                part = slice(None) if len(index) == len(times) <= chunk else index[start : start + chunk]
                 values[part] = by_row[part]._jet(times[part], derivatives, orders)
         return tuple(np.moveaxis(values, 1, 0).reshape(derivatives + 1, *shape, t.shape[-1]))
 
@@ -138,6 +140,7 @@ class Modes:
         functions: list[Array] = []
         for m in self.modes:
             a = m.a[:orders]
+            a = a[: 1 + int((a != 0).any(axis=1).nonzero()[0].max(initial=0))]  # the others add nothing
             of_value = [a]
             for _ in range(derivatives):
                 of_value.append(_derivative(m.p, of_value[-1]))
@@ -206,7 +209,7 @@ class Modes:
         """The sum of two with the same rates and orders."""
         return Modes(tuple(Mode(m.p, m.a + o.a) for m, o in zip(self.modes, other.modes, strict=True)))
 
-    def __getitem__(self, rows: NDArray[np.intp]) -> "Modes":
+    def __getitem__(self, rows: NDArray[np.intp] | slice) -> "Modes":
         """Rows of the first axis of the batch."""
         return Modes(tuple(Mode(m.p[rows], m.a[:, rows]) for m in self.modes))
 

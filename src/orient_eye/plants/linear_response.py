@@ -181,7 +181,14 @@ def measure_closed_form(response: LinearResponse, band: float = BAND, axis: str 
         kind = of_speed[which]
         return side[which] * np.where(kind, x2, slope), side[which] * np.where(kind, x3, x2)
 
-    at = _falling_root(low, up, crest)
+    first = np.concatenate(
+        [
+            _vertex(*(values[fast[:, None], point_fast[:, None] + [0, 1, 2]] for values in (t, speed))),
+            _crossing(*(values[high[:, None], point_high[:, None] + [0, 2]] for values in (t, x1))),
+            _crossing(*(values[late[:, None], cell[:, None] + [0, 1]] for values in (t, x1))),
+        ]
+    )
+    at = _falling_root(low, up, crest, first)
     height, slope = _at(modes, rows, at, 1)
     peak, peak_time = _largest(speed[:, 0], rows[of_speed], np.abs(slope[of_speed]), at[of_speed])
     overshoot, _ = _largest(np.zeros(len(t)), rows[of_height], height[of_height], at[of_height])
@@ -198,7 +205,11 @@ def measure_closed_form(response: LinearResponse, band: float = BAND, axis: str 
         x, slope = _at(modes, which, s, 1)
         return exit_side[which] * x - band, exit_side[which] * slope
 
-    exit_ = np.where(ever, _falling_root(low, up, beyond), 0.0)
+    # Where no crest moved the bracket, the values at its ends are known.
+    known = np.stack([np.abs(left[every, last]), exit_side * left[every, np.minimum(last + 1, t.shape[1] - 1)]], axis=1)
+    first = _crossing(np.stack([low, up], axis=1), known - band)
+    first[crested] = 0.5 * (low + up)[crested]
+    exit_ = np.where(ever, _falling_root(low, up, beyond, first), 0.0)
     size = response.final - response.start
     moved = size != 0
     way = np.where(moved, 1 + _at(modes, every, exit_, 0)[0], 0.0)
@@ -249,7 +260,22 @@ def _at(modes: Modes, rows: Rows, t: Array, derivatives: int) -> tuple[Array, ..
     return tuple(-values[:, 0, 0] for values in modes[rows].jet(t[:, None, None], derivatives))
 
 
-def _falling_root(low: Array, high: Array, f: Callable[[Rows, Array], tuple[Array, Array]]) -> Array:
+def _crossing(t: Array, values: Array) -> Array:
+    """Where the line through two values (n, 2) at times (n, 2) is zero, (n,)."""
+    fall = values[:, 0] - values[:, 1]
+    share = np.clip(values[:, 0] / np.where(fall == 0, 1, fall), 0, 1)
+    return np.asarray(t[:, 0] + share * (t[:, 1] - t[:, 0]))
+
+
+def _vertex(t: Array, values: Array) -> Array:
+    """Where the parabola through three values (n, 3) at times (n, 3) is largest, (n,)."""
+    before, after = t[:, 1] - t[:, 0], t[:, 2] - t[:, 1]
+    up, down = (values[:, 1] - values[:, 0]) / before, (values[:, 2] - values[:, 1]) / after
+    bend = np.where(up == down, 1, up - down)
+    return np.asarray(t[:, 0] + 0.5 * before + 0.5 * (before + after) * np.clip(up / bend, 0, 1))
+
+
+def _falling_root(low: Array, high: Array, f: Callable[[Rows, Array], tuple[Array, Array]], first: Array) -> Array:
     """Roots of functions that fall from positive at low to negative at high, each (n,).
 
     Newton's method; a step that would leave the bracket halves it instead.
@@ -258,8 +284,9 @@ def _falling_root(low: Array, high: Array, f: Callable[[Rows, Array], tuple[Arra
         low: start of the bracket.
         high: its end.
         f: of which of the n functions, and where; to their values and slopes.
+        first: where to begin.
     """
-    x = 0.5 * (low + high)
+    x = np.clip(first, low, high)
     which = np.arange(len(x))
     low, high = low.copy(), high.copy()
     for _ in range(_ROUNDS):
@@ -273,7 +300,8 @@ def _falling_root(low: Array, high: Array, f: Callable[[Rows, Array], tuple[Arra
             following = here - value / slope
         inside = (following >= low[which]) & (following <= high[which])
         x[which] = np.where(inside, following, 0.5 * (low[which] + high[which]))
-        which = which[np.abs(x[which] - here) > 1e-14 * np.abs(here)]
+        # The error after a step of Newton's is the square of the step's: one more would change nothing.
+        which = which[~(inside & (np.abs(following - here) < 1e-9 * np.abs(here)))]
     return x
 
 

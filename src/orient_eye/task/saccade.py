@@ -101,7 +101,7 @@ class SaccadeTask:
         plant: Plant,
         case: str | Case = "1",
         *,
-        targets: str | Targets = "horizontal",
+        targets: str | Targets | None = None,
         driven: Sequence[str] | None = None,
         weights: Mapping[str, float] | Sequence[float] | None = None,
         judge: str | None = None,
@@ -115,7 +115,8 @@ class SaccadeTask:
         Args:
             plant: any plant.
             case: a name of `orient_eye.task.cases.CASES`, or a case.
-            targets: a name of `orient_eye.task.targets.TARGETS`, or a set made for this plant.
+            targets: a name of `orient_eye.task.targets.TARGETS`, or a set made for this plant; None for horizontal ones,
+                or on a plant that turns the eye otherwise what it can make.
             driven: motors that the action commands; None for those that the targets need.
             weights: of the reward's terms, by name or in their order; None for those of the case on this plant, which
                 are solved where nobody has solved them (`orient_eye.task.known_weights`).
@@ -129,7 +130,7 @@ class SaccadeTask:
             InputError: an unknown name, or numbers that are none.
         """
         case = CASES[case] if isinstance(case, str) else case
-        if isinstance(targets, str):
+        if targets is None or isinstance(targets, str):
             targets = make_targets(targets, plant, driven=None if driven is None else tuple(driven))
         meant = ACTIONS[actions](plant, driven or targets.driven, pulse=case.pulse, C=case.C, speed_limit=speed_limit)
         judge = judge or targets.of

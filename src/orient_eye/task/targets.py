@@ -7,6 +7,7 @@
 Another set is a class with the members of `Targets` and a line in `TARGETS`.
 """
 
+import contextlib
 from typing import Any, Protocol
 
 import numpy as np
@@ -224,13 +225,29 @@ def vertical(plant: Plant, **options: Any) -> AxisTargets:
     return AxisTargets(plant, name="vertical", axis="pitch", **options)
 
 
-def make_targets(name: str, plant: Plant, **options: Any) -> Targets:
+def torsional(plant: Plant, **options: Any) -> AxisTargets:
+    """Rotations about the line of sight; options as those of `AxisTargets`."""
+    return AxisTargets(plant, name="torsional", axis="roll", **options)
+
+
+def make_targets(name: str | None, plant: Plant, **options: Any) -> Targets:
     """The set of that name for a plant.
+
+    Args:
+        name: one of `TARGETS`; None for the first about one axis that the plant can make: horizontal, else vertical,
+            else torsional.
+        plant: for which it is made.
+        options: of the set.
 
     Raises:
         InputError: unknown, or nothing that this plant can do.
     """
-    return TARGETS[name](plant, **options)
+    if name is not None:
+        return TARGETS[name](plant, **options)
+    for candidate in ("horizontal", "vertical", "torsional"):
+        with contextlib.suppress(InputError):
+            return TARGETS[candidate](plant, **options)
+    return TARGETS["horizontal"](plant, **options)
 
 
 def restore_targets(identity: dict[str, Any], plant: Plant, driven: tuple[str, ...]) -> Targets:
