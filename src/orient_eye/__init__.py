@@ -28,59 +28,14 @@ quaternions w, x, y, z from eye to head coordinates. `InputError` says what was 
 Names are loaded when they are first used: importing orient_eye loads neither MuJoCo nor torch.
 """
 
-from importlib import import_module, metadata
-from typing import Any
+from importlib import metadata
 
 import gymnasium
+import lazy_loader
 
 __version__ = metadata.version("orient-eye")
 
-_PUBLIC = {
-    "errors": ["InputError"],
-    "motor": ["Motor"],
-    "state": ["State"],
-    "surrogate": ["Surrogate"],
-    "commands": ["Sampled"],
-    "commands.motor_file": ["read_command"],
-    "commands.pulse_step": ["PulseStep"],
-    "commands.pulses": ["PULSES"],
-    "movement": ["Movement"],
-    "movement.measures": ["Measures", "measure"],
-    "movement.trajectory": ["Trajectory"],
-    "eyes": ["EYES"],
-    "eyes.model": ["build_model"],
-    "plants": ["PLANTS", "Plant", "PlantKind", "make_plant"],
-    "task.cases": ["CASES", "Case"],
-    "task.judge": ["JUDGES", "Judge"],
-    "task.saccade": ["Outcome", "SaccadeTask"],
-    "task.solved_weights": ["solve_weights"],
-    "task.targets": ["TARGETS", "make_targets", "saccades"],
-    "search.optimum": ["find_optimum"],
-    "search.optimum_cache": ["searched_optimum"],
-    "environments.saccade_env": ["SaccadeEnv"],
-    "environments.vector_env": ["SaccadeVectorEnv"],
-    "environments.sb3_env": ["SaccadeVecEnv"],
-    "learning.policy": ["Policy"],
-    "learning.config": ["TrainConfig"],
-    "learning.training": ["train"],
-    "sysid": ["identify_plant", "identify_recordings", "read_recordings"],
-    "recording": ["record"],
-    "recording.frames": ["frames", "write_film"],
-}
-_WHERE = {name: module for module, names in _PUBLIC.items() for name in names}
-
-__all__ = ["__version__", *sorted(_WHERE)]  # noqa: PLE0604  # strings, all of them
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _WHERE:
-        raise AttributeError(f"module 'orient_eye' has no attribute {name!r}; it offers {', '.join(__all__)}")
-    return getattr(import_module(f"orient_eye.{_WHERE[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
-
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names stand in __init__.pyi
 
 gymnasium.register(
     id="OrientEye/Saccade-v0",

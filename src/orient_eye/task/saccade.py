@@ -115,8 +115,8 @@ class SaccadeTask:
         Args:
             plant: any plant.
             case: a name of `orient_eye.task.cases.CASES`, or a case.
-            targets: a name of `orient_eye.task.targets.TARGETS`, or a set made for this plant; None for horizontal ones,
-                or on a plant that turns the eye otherwise what it can make.
+            targets: a name of `orient_eye.task.targets.TARGETS`, or a set made for this plant; None for horizontal
+                ones, or on a plant that turns the eye otherwise what it can make.
             driven: motors that the action commands; None for those that the targets need.
             weights: of the reward's terms, by name or in their order; None for those of the case on this plant, which
                 are solved where nobody has solved them (`orient_eye.task.known_weights`).
