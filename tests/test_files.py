@@ -677,6 +677,12 @@ def test_surrogate_round_trip(tmp_path: Path) -> None:
     assert json.loads(path.read_text(encoding="utf-8"))["K"] == one.K
 
 
+def test_second_order_surrogate_round_trip(tmp_path: Path) -> None:
+    limits: dict[str, Any] = {"range": (-30.0, 25.0), "speed_limit": 400.0, "acceleration_limit": 9000.0}
+    one = Surrogate(1.9, None, "pan", wn=12.0, zeta=0.9, dead_time=0.008, axis="pitch", amplitudes=(1, 20), **limits)
+    assert Surrogate.load(one.save(tmp_path / "surrogate.json")) == one
+
+
 def test_shipped_surrogate_is_the_thesis() -> None:
     """Thesis 3.3.1."""
     shipped = Surrogate.load("thesis")

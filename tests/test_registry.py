@@ -101,7 +101,7 @@ def test_an_installed_package_adds_entries(installed: Path) -> None:
     """Its names are listed without it; ours is not replaced by one of the same name."""
     ours = object()
     registry: Registry[object] = Registry("gadget", {"ours": ours})
-    assert list(registry)[0] == "ours"
+    assert next(iter(registry)) == "ours"
     assert set(registry) == {"ours", "their-first", "their-second", "broken", "nowhere"}
     assert len(registry) == 5
     assert "their-first" in registry

@@ -1,5 +1,6 @@
 """Tables that people bring: whatever program wrote them, the same numbers, or an error that names the line."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -106,7 +107,8 @@ def test_any_file_is_a_table_or_an_error_that_names_it(
     try:
         read = table(tmp_path_factory.mktemp("any"), content)
     except InputError as error:
-        assert "table.csv" in str(error)
+        refused = str(error)
+        assert "table.csv" in refused
     else:
         assert {column.shape for column in read.columns.values()} == {(len(read.lines),)}
 
@@ -217,8 +219,8 @@ def test_the_largest_table_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_time_rises(tmp_path_factory: pytest.TempPathFactory, time: list[float], strictly: bool) -> None:
     """Or the first line where it does not is named."""
     read = table(tmp_path_factory.mktemp("time"), "a\n" + "".join(f"{float(t)!r}\n" for t in time))
-    pairs = enumerate(zip(time, time[1:], strict=False))
-    bad = [k for k, (one, next_) in pairs if next_ < one or (strictly and next_ == one)]
+    pairs = enumerate(pairwise(time))
+    bad = [k for k, (one, then) in pairs if then < one or (strictly and then == one)]
     if bad:
         with pytest.raises(InputError, match=rf"table\.csv, line {bad[0] + 3}: time must rise .* a = .* follows"):
             read.rising_time("a", strictly=strictly)

@@ -17,7 +17,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from orient_eye import rotations
 from orient_eye.commands.exponentials import Modes, Numbers, impulse_response
@@ -378,6 +377,8 @@ def _free_states(over_step: Array, lag: Array, bend: Array) -> Array:
         bend: (samples, saccades).
     """
     if over_step.ndim == 2:  # one eye: by Cayley and Hamilton each state is a filter of order two
+        from scipy.signal import lfilter  # half a second, which closed forms do not wait for
+
         trace, product = over_step[0, 0] + over_step[1, 1], np.linalg.det(over_step)
         push = np.array([lag, -1.0])
         behind = over_step @ push - trace * push
