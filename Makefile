@@ -6,12 +6,13 @@ INSTALLED := $(VENV)/.installed
 DEMO ?= demo
 COVERAGE ?= --cov --cov-report=term:skip-covered
 
-.PHONY: help demo test check bench clean
+.PHONY: help demo test check rigs bench clean
 
 help:
 	@echo "make demo   install, identify the eye, train a saccade policy (minutes), picture and recording in $(DEMO)/"
 	@echo "make test   install and run all tests, with coverage of lines and branches; make test COVERAGE= is faster"
 	@echo "make check  ruff and the type checker"
+	@echo "make rigs   thirty simulated rigs, from their recorded steps to a command that they perform (an hour)"
 	@echo "make bench  speed of the plants and of the learning, as ratios"
 
 $(INSTALLED): pyproject.toml constraints.txt
@@ -38,9 +39,13 @@ check: $(INSTALLED)
 	$(BIN)/ruff format --check src tests scripts benchmarks examples
 	$(BIN)/mypy
 
+rigs: $(INSTALLED)
+	RIGS=10 $(BIN)/python -m pytest -n 2 tests/test_rigs.py
+
 bench: $(INSTALLED)
 	$(BIN)/python benchmarks/plants.py
 	$(BIN)/python benchmarks/learning.py
+	$(BIN)/python benchmarks/startup.py
 
 clean:
 	rm -rf $(VENV) $(DEMO) .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -177,7 +177,7 @@ def test_a_step_needs_a_reset_before_it() -> None:
         ({"plant": LinearPlant(), "plant_options": {"step_s": 0.01}}, "plant_options go with a plant's name"),
         ({"plant": "lpf", "band": 2.0}, "settling band"),
         ({"plant": "lpf", "driven": ("motor1",)}, "cannot drive"),
-        ({"plant": "lpf", "bend": 0.01}, "no such option.*'bend'"),
+        ({"plant": "lpf", "bend": 0.01}, "no option bend; of a task it has case, targets"),
         ({"plant": "lpf", "plant_options": {"eye": "thesis"}}, "plant 'lpf'.*'eye'.*its options are surrogate"),
         ({"plant": "lpf", "weights": (1.0, 2.0)}, "4 weights, accuracy, energy, duration, overshoot"),
         ({"plant": "lpf", "weights": (0.0, 0.0, 0.0, 0.0)}, "not all 0"),

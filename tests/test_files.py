@@ -183,8 +183,8 @@ def test_a_written_command_is_read_again(tmp_path: Path, eye: Plant) -> None:
         ("t_s,velocity\n0,0\n0.1,0\n", "cannot be commanded by velocity"),
         ("t_s\n0\n0.1\n", "commands no motor; add a column, one of tau1_deg, tau2_deg, tau3_deg"),
         ("t_s,tau7_deg\n0,0\n0.1,0\n", "commands no motor"),
-        ("t_s,tau2_deg\n0,1\n", "lasts between one step and one hour, this one 0 s"),
-        ("t_s,tau2_deg\n0,1\n5000,1\n", "lasts between one step and one hour, this one 5000 s"),
+        ("t_s,tau2_deg\n0,1\n", "a command lasts up to one hour, this one 0 s"),
+        ("t_s,tau2_deg\n0,1\n5000,1\n", "a command lasts up to one hour, this one 5000 s"),
     ],
 )
 def test_bad_command_files_are_refused(tmp_path: Path, eye: Plant, text: str, message: str) -> None:

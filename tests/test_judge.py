@@ -465,5 +465,7 @@ def test_a_task_is_its_identity() -> None:
     moved = SaccadeTask.restore(TASK.identity(), plant)
     assert moved.plant is plant
     assert moved.identity()["actions"]["driven"] == ["motor2"]
-    with pytest.raises(InputError, match="no task of this version"):
+    with pytest.raises(InputError, match="4 weights"):
         SaccadeTask.restore({**TASK.identity(), "weights": None})
+    with pytest.raises(InputError, match="no task of this version"):
+        SaccadeTask.restore({**TASK.identity(), "band": None})

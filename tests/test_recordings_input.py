@@ -4,22 +4,29 @@ The logs are of a simulated rig (scripts/make_prototype_log.py). Those of the re
 of the project; where they are at hand, in ../shared, what they say is tested too.
 """
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from make_prototype_log import Logs, Rig, main, make_logs, text
+from orient_eye import rotations
 from orient_eye.cli.sysid import Sysid
 from orient_eye.errors import InputError
 from orient_eye.plants import make_plant
+from orient_eye.rig import Rig as Described
+from orient_eye.rig import RigMotor
+from orient_eye.surrogate import Surrogate
 from orient_eye.sysid import StepResponse, identify_recordings, prototype_log, read_recording, read_recordings
 from orient_eye.sysid.fit import fit_model
 from orient_eye.sysid.models import MODELS
-from orient_eye.sysid.recording_checks import warnings_of
+from orient_eye.sysid.recording_checks import doubts_of, warnings_of
 from orient_eye.sysid.replay import replay
 from orient_eye.sysid.report import write_report
+from orient_eye.tables import read_table
 
 PROTOTYPE = Path(__file__).resolve().parents[2] / "shared" / "data" / "prototype_steps"
 of_the_prototype = pytest.mark.skipif(
@@ -67,7 +74,7 @@ def test_what_simulate_writes_is_read_and_identified(tmp_path: Path) -> None:
     command = np.zeros((1, 801, 3))
     command[:, 1:, 1] = 10.0
     path = plant.move(command).trajectory()[0].to_csv(tmp_path / "trajectory.csv")
-    found = identify_recordings(read_recordings([path], "motor2", "yaw"))
+    found = identify_recordings(read_recordings([path], "motor2", "yaw"), model="first_order")
     gain, w0 = found.surrogate.K, found.surrogate.w0
     assert gain == pytest.approx(1.4672, rel=1e-3)
     assert w0 == pytest.approx(17.567, rel=0.01)  # the arm takes one step of 1 ms, not none
@@ -130,7 +137,7 @@ BAD = {
     "1,2,3\n" * 9: "must name the columns: t_s,motor_deg,eye_deg",
     table(7): "7 rows of numbers; a step response needs at least 8",
     table(eye_deg=None): "no angle of the eye",
-    table(motor_deg=None): "no column tau2_deg",
+    table(motor_deg=None): "no column motor_deg or tau2_deg",
     table(t_s=None): "no column t_s",
     table().replace("motor_deg", "eye_deg"): "a column stands twice",
     table()[:-20] + "\n0.7,1": "2 cells, but there are 3 columns",
@@ -178,6 +185,202 @@ def test_recordings_that_tell_little_are_warned_of(tmp_path: Path) -> None:
     coarse = read_recording(written(tmp_path, table(eye_deg=15.0 * (time > 0.05))))
     assert "only 0 rows" in " ".join(warnings_of(coarse))
     assert warnings_of(read_recording(written(tmp_path, table()))) == []
+
+
+# --- the rig's own language -----------------------------------------------------------------------------
+
+BENCH = Described(
+    "bench",
+    (
+        RigMotor("left", "counts", 11.4, zero=512, range=(-40, 40), speed_limit=300, acceleration_limit=9000),
+        RigMotor("right", "rad", sign=-1, zero=0.1, range=(-50, 50), speed_limit=400),
+    ),
+    {"pitch": {"left": 1.0, "right": -1.0}, "yaw": {"left": 1.0, "right": 1.0}},
+    command_rate_hz=200,
+)
+
+
+def bench_eye(time: np.ndarray, drive: np.ndarray) -> np.ndarray:
+    """A second order with dead time, by scipy."""
+    K, wn, zeta, late = 1.6, 22.0, 0.7, 0.006
+
+    def slope(t: float, state: np.ndarray) -> list[float]:
+        return [state[1], wn * wn * (K * np.interp(t - late, time, drive) - state[0]) - 2 * zeta * wn * state[1]]
+
+    rest = [K * drive[0], 0.0]
+    return solve_ivp(slope, (time[0], time[-1]), rest, t_eval=time, max_step=5e-3).y[0]
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [("left_counts", "right_rad"), ("left_deg", "right_rad"), ("left_deg", "right_deg"), ("left - right_deg",)],
+)
+def test_the_drive_is_read_in_any_of_the_rigs_units(columns: tuple[str, ...], tmp_path: Path) -> None:
+    drive = 20.0 * (np.arange(30) > 2)
+    told = BENCH.to_driver("pitch", drive) | {"left_deg": drive / 2, "right_deg": -drive / 2, "left - right_deg": drive}
+    text = table(motor_deg=None, eye_deg=None, **{c: told[c] for c in columns}, pitch_deg=1.5 * drive)
+    step = read_recording(written(tmp_path, text), axis="pitch", rig=BENCH)
+    np.testing.assert_allclose(step.motor_deg, drive, atol=1e-9)
+    assert (step.drive, step.axis) == ("left - right", "pitch")
+    assert not any("other axes" in w for w in step.warnings)
+
+
+def test_what_a_rig_needs_is_asked_for(tmp_path: Path) -> None:
+    path = written(tmp_path, table(motor_deg=None, left_counts=np.arange(30)))
+    with pytest.raises(InputError, match="turns pitch, yaw: name one of these by --axis"):
+        read_recording(path, rig=BENCH)
+    with pytest.raises(InputError, match=r"needs the columns right_rad \(or right_deg\)"):
+        read_recording(path, axis="yaw", rig=BENCH)
+    with pytest.raises(InputError, match="leave the motor 'motor2' out"):
+        read_recording(path, "motor2", "yaw", rig=BENCH)
+    one = Described("one", (RigMotor("servo"), RigMotor("other")), {"yaw": {"servo": 1.0}})
+    moving = table(motor_deg=None, servo_deg=10.0 * (np.arange(30) > 0), other_deg=np.linspace(0, 5, 30))
+    step = read_recording(written(tmp_path, moving), rig=one)
+    assert "motors of other axes move too (other by 5.0 deg)" in " ".join(step.warnings)
+
+
+def test_planned_steps_come_back_as_the_rig_that_did_them(tmp_path: Path) -> None:
+    """The plan's tables through an eye of scipy's, rows dropped, and what was recorded through the command."""
+    BENCH.save(tmp_path / "rig.toml")
+    rig = str(tmp_path / "rig.toml")
+    plan = Sysid(plan=True, rig=rig, axis="pitch", out=tmp_path / "plan").run()
+    assert {"README.md", *(s["file"] for s in plan["steps"])} == set(plan["files"])
+    random, paths = np.random.default_rng(0), []
+    for row in plan["steps"][:4]:
+        told = read_table(tmp_path / "plan" / row["file"], "")
+        eye = bench_eye(told["t_s"], BENCH.from_driver("pitch", told.columns))
+        kept = random.random(len(eye)) > 0.3
+        columns = {"motor_deg": None, "eye_deg": None, **told.columns, "pitch_deg": eye}
+        text = table(**{name: None if v is None else v[kept] for name, v in columns.items()})
+        paths.append(written(tmp_path, text, row["file"]))
+    until = max(row["until_s"] for row in plan["steps"])
+    out = tmp_path / "run"
+    result = Sysid(recording=tuple(paths), rig=rig, axis="pitch", until=until, out=out).run()
+    assert result["model"] == "second_order_dead_time"
+    assert (result["K"], result["wn"], result["zeta"]) == pytest.approx((1.6, 22.0, 0.7), rel=0.02)
+    assert result["dead_time"] == pytest.approx(0.006, abs=0.0015)
+    number = Surrogate.load(out / "surrogate.json")
+    assert (number.motor, number.axis, number.range) == ("left - right", "pitch", (-80, 80))
+    assert (number.speed_limit, number.acceleration_limit) == (600, 18000)
+    assert Described.from_plain(number.rig or {}, "surrogate") == BENCH == Described.load(out / "rig.toml")
+
+
+def test_a_plan_and_a_rig_are_asked_for_what_they_need(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="--plan needs the rig"):
+        Sysid(plan=True).run()
+    with pytest.raises(InputError, match="leave --recording out"):
+        Sysid(plan=True, rig="prototype", recording=(tmp_path / "x.csv",)).run()
+
+
+def test_without_a_rig_a_first_one_is_written_and_goes_on(tmp_path: Path) -> None:
+    path = written(tmp_path, table())
+    first = Sysid(recording=(path,), axis="pitch", out=tmp_path / "first").run()
+    text = (tmp_path / "first" / "rig.toml").read_text()
+    asked = ("# command_rate_hz", "# range", "# speed_limit", "# acceleration_limit")
+    assert all(any(line.startswith(key) for line in text.splitlines()) for key in asked)
+    assert "from 3 to 13" in text
+    rig = Described.load(tmp_path / "first" / "rig.toml")
+    assert rig == Described("my-rig", (RigMotor("motor"),), {"pitch": {"motor": 1.0}})
+    again = Sysid(recording=(path,), rig=str(tmp_path / "first" / "rig.toml"), out=tmp_path / "again").run()
+    assert again["K"] == first["K"]
+    assert (again["axis"], again["motor"]) == ("pitch", "motor")
+    config = json.loads((tmp_path / "again" / "run.json").read_text())["config"]
+    assert "plant" not in config
+    assert config["recording"] == [str(path)]
+
+
+def test_an_axis_that_nobody_said_is_said(tmp_path: Path) -> None:
+    found = identify_recordings([read_recording(written(tmp_path, table()))])
+    assert "nobody said which axis" in " ".join(found.warnings)
+    tilted = table(eye_deg=None, roll_deg=15 * (1 - np.exp(-17.5 * np.linspace(0, 0.6, 30))))
+    assert read_recording(written(tmp_path, tilted)).axis == "roll"
+
+
+@pytest.mark.parametrize("axis", ["yaw", "pitch", "roll"])
+def test_measured_and_fitted_eyes_are_shown_where_only_an_angle_was_recorded(axis: str, tmp_path: Path) -> None:
+    steps = read_recordings([written(tmp_path, table())], axis=axis)
+    found = identify_recordings(steps)
+    measured, fitted = replay(steps), replay(steps, found.answer)
+    for shown, angle in ((measured, steps[0].eye_deg), (fitted, found.answer(steps[0]))):
+        angles = dict(zip(("yaw", "pitch", "roll"), rotations.to_euler(shown.orientation[0]), strict=True))
+        np.testing.assert_allclose(angles.pop(axis)[[0, -1]], angle[[0, -1]], atol=1e-6)
+        np.testing.assert_allclose(list(angles.values()), 0, atol=1e-9)
+    assert "recording.rrd" in write_report(found, tmp_path)["files"]
+
+
+# --- what is probably wrong -----------------------------------------------------------------------------
+
+T = np.linspace(0, 0.6, 30)
+EYE = 1 + 15 * (1 - np.exp(-17.5 * T))
+TURNED = np.deg2rad(EYE - 1) / 2
+PITCHED = {"q_w": np.cos(TURNED), "q_x": 0 * T, "q_y": np.sin(TURNED), "q_z": 0 * T}
+DOUBTFUL: dict[str, dict[str, object]] = {
+    "radians.*read in deg": {"eye_deg": np.deg2rad(EYE)},
+    "motor moves by 0.175.*radians.*motor_deg": {"motor_deg": np.deg2rad(10.0) * (T > 0)},
+    "motor moves by 0.175.*eye turns by 0.262": {
+        "motor_deg": np.deg2rad(10.0) * (T > 0), "eye_deg": np.deg2rad(EYE),
+    },
+    "are these ms": {"t_s": 1000 * T},
+    "recording lasts .*are these ms": {"t_s": np.linspace(0, 1100, 30)},
+    "stands at 512 to 626.*counts": {"motor_deg": 512.0 + 114 * (T > 0)},
+    "eye turns by 853.*counts": {"eye_deg": EYE * 853 / 15},
+    "15 deg in pitch and 0 deg in yaw.*--axis pitch": PITCHED,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", DOUBTFUL)
+def test_input_that_is_probably_wrong_is_named(words: str, tmp_path: Path) -> None:
+    step = read_recording(written(tmp_path, table(**DOUBTFUL[words])))
+    with pytest.raises(InputError, match=rf"step.csv: .*{words}.*--force"):
+        identify_recordings([step])
+    assert not doubts_of(read_recording(written(tmp_path, table())))
+
+
+def test_who_insists_gets_a_note_instead(tmp_path: Path) -> None:
+    step = read_recording(written(tmp_path, table(motor_deg=512.0 + 114 * (T > 0))))
+    found = identify_recordings([step], force=True)
+    assert "are these counts" in " ".join(found.warnings)
+
+
+NAMED = {
+    table(motor_deg=None, motor_rad=0.2 * T): "For motor_rad: .*rig file.*name the column motor_deg",
+    table(motor_deg=None, motor_counts=200 * T): "For motor_counts: .*--rig",
+    table(t_s=None, t_ms=1000 * T): "no column t_s.*name t_ms t_s and give it in s",
+    table(eye_deg=None, eye_rad=0.2 * T): "eye_rad is in rad: multiply it by 57.29578 and name it eye_deg",
+}
+
+
+@pytest.mark.parametrize("text", NAMED, ids=NAMED.values())
+def test_columns_in_other_units_are_named(text: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=NAMED[text]):
+        read_recording(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("step_deg", [3.0, 10.0, 30.0])
+def test_a_standing_motor_with_noise_raises_no_alarm(step_deg: float, tmp_path: Path) -> None:
+    random, time = np.random.default_rng(8), np.arange(-0.2, 1.0, 0.01)
+    for _ in range(40):
+        noise = 0.05 * random.normal(size=(2, len(time)))
+        motor = step_deg * np.clip(time / 0.05, 0, 1) + noise[0]
+        eye = 1.5 * step_deg * (1 - np.exp(-17 * np.maximum(time - 0.02, 0))) + noise[1]
+        step = read_recording(written(tmp_path, table(t_s=time, motor_deg=motor, eye_deg=eye)))
+        assert warnings_of(step) == []
+        assert doubts_of(step) == []
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_motor_that_still_moves_is_seen_through_noise(noise: float, tmp_path: Path) -> None:
+    random, time = np.random.default_rng(9), np.arange(-0.2, 1.0, 0.01)
+    for end in (0.95, 1.5):
+        motor = 10 * np.clip(time / end, 0, 1) + noise * random.normal(size=len(time))
+        step = read_recording(written(tmp_path, table(t_s=time, motor_deg=motor, eye_deg=1.4 * motor)))
+        assert any("moves until the end" in w for w in warnings_of(step))
+
+
+def test_noise_that_hides_the_step_is_said(tmp_path: Path) -> None:
+    motor = 2.0 * (T > 0) + 0.2 * np.random.default_rng(1).normal(size=30)
+    step = read_recording(written(tmp_path, table(motor_deg=motor, eye_deg=EYE)))
+    assert any("make larger steps" in w for w in warnings_of(step))
 
 
 # --- logs as the prototype writes them ------------------------------------------------------------------
@@ -340,6 +543,19 @@ def test_a_cut_log_is_refused(tmp_path: Path) -> None:
         read_recording(written(tmp_path, log[:2000], "cut.txt"))
     with pytest.raises(InputError, match="position2 is 'x'"):
         read_recording(written(tmp_path, " x ".join(log.rsplit(" 510 ", 1)), "word.txt"))
+
+
+@pytest.mark.parametrize("rig", [None, "prototype"])
+def test_logs_are_of_the_prototypes_pitch_drive(rig: str | None, tmp_path: Path) -> None:
+    described = None if rig is None else Described.load(rig)
+    steps = read_recordings(made_files(tmp_path), rig=described)
+    down = -1 if rig else 1  # in the rig's sense positive pitch is down, and these steps go up
+    assert [step.amplitude_deg * down for step in steps] == pytest.approx(STEPS_DEG, abs=0.3)
+    number = identify_recordings(steps, described).surrogate
+    assert (number.K, number.axis, number.motor) == (pytest.approx(0.75, rel=0.002), "pitch", "motor1 + motor3")
+    assert (number.speed_limit, number.range) == (698.0, (-90.0, 90.0))
+    pitch = replay(steps).pitch_deg
+    np.testing.assert_allclose((pitch[:, -1] - pitch[:, 0]) * -down, [s.eye_deg[-1] for s in steps], rtol=0.03)
 
 
 def test_command_on_logs(tmp_path: Path) -> None:

@@ -334,10 +334,95 @@ def test_a_setting_the_plant_has_not_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
-def test_the_trained_surrogate_is_that_of_the_recordings() -> None:
-    rng = np.random.default_rng(3)
-    steps = [noisy(ramp(rng, end=end), "second_order_dead_time", 0.05, rng) for end in (10.0, 20.0)]
-    found = identify_recordings(steps)
+# --- the surrogate of recordings ------------------------------------------------------------------------
+
+
+def recorded(model: str, seed: int = 3, noise: float = 0.05) -> list[StepResponse]:
+    rng = np.random.default_rng(seed)
+    return [noisy(ramp(rng, end=end), model, noise, rng) for end in (10.0, -15.0, 20.0)]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_surrogate_keeps_the_model_that_explains_the_recordings(model: str) -> None:
+    found = identify_recordings(recorded(model))
+    number = found.surrogate
+    assert found.surrogate_model.name == model
+    assert not found.undetermined
+    for name, true in zip(MODELS[model].names, TRUTH[model], strict=True):
+        low, high = number.intervals[name]
+        assert low < getattr(number, name) < high
+        assert abs(getattr(number, name) - true) < 1.5 * (high - low) / 2
+    assert number.amplitudes == (10.0, 20.0)
+    assert (number.motor, number.axis, number.rig) == ("motor", "yaw", None)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_surrogate_is_a_plant_that_answers_as_the_fit_did(model: str) -> None:
+    """Two pieces of code: the models of sysid on uneven samples, the plant's own on its millisecond."""
+    found = identify_recordings(recorded(model))
+    plant = make_plant("lpf", surrogate=found.surrogate)
+    time = plant.step_s * np.arange(601)
+    motor = 20 * np.clip((time - 0.02) / 0.08, 0, 1)
+    answer = found.answer(StepResponse("same", time, motor, 0 * time))
+    np.testing.assert_allclose(plant.move(motor[None, :, None]).trajectory().yaw_deg[0], answer, atol=1e-6)
+
+
+def test_a_model_can_be_chosen() -> None:
+    steps = recorded("second_order_dead_time")
+    found = identify_recordings(steps, model="first_order")
     joint = fit_model(MODELS["first_order"], steps)
     assert (found.surrogate.K, found.surrogate.w0) == (joint["K"].value, joint["w0"].value)
-    assert any("describes these data better" in w for w in found.warnings)
+    assert any("second order, dead time describes these data better" in w for w in found.warnings)
+    with pytest.raises(InputError, match="a model is best, first_order"):
+        identify_recordings(steps, model="third_order")
+
+
+def test_of_a_plant_the_best_model_can_be_asked_for() -> None:
+    plant = make_plant("lpf", surrogate=Surrogate(1.2, wn=20.0, zeta=0.6))
+    number = identify_plant(plant, (5.0, 10.0, -20.0), model="best").surrogate
+    assert (number.K, number.wn, number.zeta) == pytest.approx((1.2, 20.0, 0.6), rel=1e-4)
+    assert number.dead_time == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("model", ["first_order", "second_order"])
+def test_a_dead_time_that_may_as_well_be_0_is_left_out(model: str, seed: int) -> None:
+    chosen = preferred(compare(recorded(model, seed, noise=0.3)))
+    assert chosen.fit.model.names[-1] != "dead_time" or chosen.fit["dead_time"].interval[0] > 0
+    late = replace(chosen.fit, model=MODELS[f"{model}_dead_time"])
+    estimate = replace(fit_model(late.model, recorded(model, seed)).estimates[-1], value=0.01, half_width=0.02)
+    late = replace(late, estimates=(*late.estimates, estimate))
+    assert not late.shows_dead_time
+
+
+def test_what_the_data_do_not_determine_is_not_written_unless_forced(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    time = np.linspace(0, 0.6, 60)
+    columns = np.column_stack([time, 10.0 * (time > 0.02), 3 * rng.normal(size=60)])
+    path = tmp_path / "noise.csv"
+    np.savetxt(path, columns, delimiter=",", header="t_s,motor_deg,yaw_deg", comments="")
+    with pytest.raises(InputError, match=r"do not determine the surrogate.*Record several steps.*--force"):
+        Sysid(recording=(path,), out=tmp_path / "run").run()
+    assert (tmp_path / "run" / "recordings.png").exists()
+    assert not (tmp_path / "run" / "surrogate.json").exists()
+    result = Sysid(recording=(path,), out=tmp_path / "forced", force=True).run()
+    assert result["undetermined"]
+    Surrogate.load(tmp_path / "forced" / "surrogate.json")
+
+
+def test_recordings_of_different_axes_are_not_one() -> None:
+    steps = recorded("first_order")
+    with pytest.raises(InputError, match=r"one axis are identified together.*pitch, yaw"):
+        identify_recordings([steps[0], replace(steps[1], axis="pitch")])
+    with pytest.raises(InputError, match=r"one drive are identified together.*motor, tilt"):
+        identify_recordings([steps[0], replace(steps[1], drive="tilt")])
+    with pytest.raises(InputError, match="no recording"):
+        identify_recordings([])
+
+
+def test_an_eye_that_rests_beside_its_zero_is_said() -> None:
+    steps = [replace(step, rest=(2.0, 10.0)) for step in recorded("first_order")]
+    words = " ".join(identify_recordings(steps).warnings)
+    assert f"{10 - 1.4 * 2:+.1f} deg beside" in words
+    straight = [replace(step, rest=(2.0, 1.4 * 2)) for step in steps]
+    assert "beside" not in " ".join(identify_recordings(straight).warnings)

@@ -23,8 +23,11 @@ from orient_eye.learning.loop import StopRequest, TrainingLoop
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.training import resume, train
 from orient_eye.plants import make_plant
+from orient_eye.plants.linear import LinearPlant
+from orient_eye.plants.uncertain import uncertain
 from orient_eye.search.optimum import Optimum
 from orient_eye.state import State
+from orient_eye.surrogate import Surrogate
 from orient_eye.task.judge import JUDGES
 from orient_eye.task.saccade import Outcome, SaccadeTask
 
@@ -359,3 +362,107 @@ def test_a_stop_is_asked_for_by_the_first_signal_and_forced_by_the_second() -> N
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
     assert before == {number: signal.getsignal(number) for number in before}
+
+
+# --- rigs ------------------------------------------------------------------------------------------
+
+INTERVALS = {"K": (1.8, 2.0), "wn": (10.5, 13.5), "zeta": (0.75, 1.25), "dead_time": (-0.002, 0.014)}
+RIG = Surrogate(
+    1.9, wn=12.0, zeta=0.9, dead_time=0.008, motor="servo", axis="pitch", range=(-60, 60), speed_limit=350.0,
+    intervals=INTERVALS,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> TrainConfig:
+    file = RIG.save(tmp_path_factory.mktemp("rig") / "surrogate.json")
+    return replace(TINY, updates=20, plant_options={"surrogate": str(file)})
+
+
+def test_a_rig_says_what_it_is_trained_on(rig: TrainConfig, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Axis, bounds and weights follow from the plant; they are printed, stored, and held against the thesis'."""
+    from orient_eye.cli.train import Train
+
+    Train(replace(rig, end_point_error_deg=0.5), out=tmp_path / "run", quiet=True).run()
+    said = " ".join(capsys.readouterr().err.split())
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    task = Policy.load(tmp_path / "run").task()
+    assert task.targets.name == "vertical"
+    assert result["weights"] == dict(task.weights)
+    ends = np.array([result["bounds"][name] for name in ("B", "D", "k0")])
+    assert np.array_equal(ends, np.stack([task.actions.low, task.actions.high], axis=1))
+    assert "actions: B from 4.8 to 300 1/s" in said
+    assert "by rule (docs/weights.md)" in said
+    assert "the thesis' eye has B from 18 to 80 1/s, k0 from 5 to 40 1/s" in said
+
+
+def test_the_error_one_can_live_with_sets_the_weight(rig: TrainConfig) -> None:
+    fine, usual, coarse = (replace(rig, end_point_error_deg=error).make_task().weights for error in (0.125, 0.25, 1.0))
+    assert rig.make_task().weights == usual
+    assert fine["accuracy"] > 1.9 * usual["accuracy"] > 3 * coarse["accuracy"]
+    assert fine["duration"] == usual["duration"] == coarse["duration"]
+    thesis = TrainConfig(end_point_error_deg=0.25).make_task()
+    assert thesis.weights_from.startswith("by rule")
+    with pytest.raises(InputError, match="both set"):
+        replace(rig, weights=(1.0, 1.0, 1.0, 1.0), end_point_error_deg=0.25).make_task()
+    with pytest.raises(InputError, match="positive, got 0"):
+        replace(rig, end_point_error_deg=0.0).make_task()
+
+
+def test_each_saccade_has_an_eye_of_its_own() -> None:
+    """A batch of eyes against one plant for each of them, limited and not."""
+    plant = uncertain(LinearPlant(RIG))
+    task = SaccadeTask.of_case(plant)
+    start, target = task.targets.draw(12, np.random.default_rng(1))
+    action = task.actions.from_unit(np.random.default_rng(2).uniform(-1, 1, (12, 3)))
+    action[:, 1] = task.actions.likely(target)[:, 1]
+    action[::3, [0, 2]] = 12.0, 14.0  # gentle: the motor follows the small ones of these
+    command = task.actions.command(start, target, action)
+    movement = plant.move(command, start, task.horizon_s, np.random.default_rng(3))
+    numbers = plant.draw(12, np.random.default_rng(3))
+    measures = movement.measure()
+    assert 0 < movement.limited.sum() < 12
+    assert len(set(numbers.K)) == 12
+    for i in range(12):
+        wn = np.sqrt(numbers.poles[0][i] * numbers.poles[1][i]).real
+        zeta = (numbers.poles[0][i] + numbers.poles[1][i]).real / (2 * wn)
+        one = replace(RIG, K=numbers.K[i], wn=wn, zeta=zeta, dead_time=numbers.dead_time[i])
+        alone = LinearPlant(one).move(command[np.arange(12) == i], None, task.horizon_s)
+        for name in ("settling_time_s", "overshoot", "peak_velocity_deg_s", "final"):
+            assert getattr(measures, name)[i] == pytest.approx(getattr(alone.measure(), name)[0], rel=1e-6, abs=1e-9)
+        assert movement.energy()[i] == pytest.approx(alone.energy()[0], rel=1e-12)
+        assert movement.trajectory().orientation[i] == pytest.approx(alone.trajectory().orientation[0], abs=1e-5)
+    nominal = plant.move(command, start, task.horizon_s).measure()
+    assert nominal.settling_time_s == pytest.approx(LinearPlant(RIG).move(command, start).measure().settling_time_s)
+
+
+def test_robust_training(rig: TrainConfig, tmp_path: Path) -> None:
+    """Seeded, other than without, and it says what it costs; resumed it ends in the same numbers."""
+    robust = replace(rig, robust=True)
+    results = [train(c, tmp_path / name, quiet=True) for c, name in ((robust, "a"), (robust, "b"), (rig, "c"))]
+    a, b, c = (_numbers(tmp_path / name) for name in "abc")
+    assert all(np.array_equal(a[name], b[name]) for name in a)
+    assert any(not np.array_equal(a[name], c[name]) for name in a)
+    told = results[0]["robust"]
+    assert told["intervals"]["dead_time"] == (0.0, 0.014)
+    assert told["policy"] == results[1]["robust"]["policy"]
+    # K is off by 5 % at most, so the best actions for the nominal plant land 5 % off of 35 deg or so.
+    assert 0.3 < told["best_of_nominal"]["error_deg_worst"] < 2.5
+    assert told["best_of_nominal"]["overshoot_worst"] > told["best_of_nominal"]["overshoot_mean"] > 0
+    assert "robust" not in results[2]
+    settings = TrainSettings.from_plain(json.loads((tmp_path / "a" / "run.json").read_text())["config"])
+    assert settings == TrainSettings.from_plain(asdict(robust.resolved()))
+    assert Policy.load(tmp_path / "a").task().plant.identity() == LinearPlant(RIG).identity()
+
+
+def test_nothing_is_robust_to_what_is_not_known(rig: TrainConfig, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="has no intervals"):
+        replace(TINY, robust=True).resolved()
+    with pytest.raises(InputError, match="plant 'mujoco' has no identified intervals"):
+        replace(TINY, plant="mujoco", robust=True).resolved()
+    for ends in ((0.2, float("inf")), (-1.0, 3.0)):
+        bad = replace(RIG, intervals={**INTERVALS, "zeta": ends}).save(tmp_path / "bad.json")
+        with pytest.raises(InputError, match="recordings do not tell it"):
+            replace(rig, plant_options={"surrogate": str(bad)}, robust=True).resolved()
+    with pytest.raises(InputError, match=r"are of K, wn, zeta, dead_time, got w0"):
+        uncertain(LinearPlant(RIG), {"w0": (1.0, 2.0)})

@@ -246,7 +246,7 @@ def _both(task: SaccadeTask, action: Array) -> tuple[Any, Array, Array]:
         (ChosenSaccade((30.0,), (30.0,)), "begins and ends at .*30.* deg"),
         (ChosenSaccade(target=(200.0,)), "between -180 and 180"),
         (ChosenSaccade(D=(1.0, 2.0)), "one number for each of the 1 driven motors"),
-        (ChosenSaccade(B=-35.0), "B must be positive"),
+        (ChosenSaccade(B=-35.0), "B and k0 of the chosen saccade are positive"),
     ],
 )
 def test_saccades_without_weights(chosen: ChosenSaccade, message: str) -> None:

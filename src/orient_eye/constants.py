@@ -10,3 +10,7 @@ YAW_LIMIT_DEG = 35.0
 """Starts and targets are drawn up to here, to either side (thesis 4.6)."""
 STEP_S = 0.001
 """Interval between the samples of commands and trajectories (thesis 3.2)."""
+LONGEST_S = 3600.0
+"""No movement is simulated longer than this."""
+ANGLES = ("yaw", "pitch", "roll")
+"""By which an orientation is told: turns about z, y and x (`orient_eye.rotations`)."""

@@ -1,5 +1,6 @@
 """A motor as it is described by the model of an eye or by a rig: name, unit, range, limits."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -38,7 +39,7 @@ class Motor:
     def __post_init__(self) -> None:
         low, high = self.range
         inside = max(low, self.working[0]), min(high, self.working[1])
-        if not (low < high and inside[0] < inside[1]):
+        if any(math.isnan(end) for end in (*self.range, *self.working)) or not (low < high and inside[0] < inside[1]):
             raise InputError(f"motor {self.name!r}: a range goes from low to high, got {self.range}, {self.working}")
         object.__setattr__(self, "working", inside)
         for limit in (self.speed_limit, self.acceleration_limit):
@@ -67,8 +68,10 @@ def check_driven(motors: Sequence[Motor], driven: Sequence[str], plant: str) -> 
     """Indices of the driven motors among a plant's.
 
     Raises:
-        InputError: none, or one the plant has not.
+        InputError: none, one twice, or one the plant has not.
     """
+    if len(set(driven)) != len(driven):
+        raise InputError(f"a motor is named twice among {', '.join(driven)}; name each once")
     missing = [name for name in driven if name not in names(motors)]
     if missing or not driven:
         raise InputError(f"plant {plant!r} has the motors {', '.join(names(motors))}; cannot drive {missing}")

@@ -33,12 +33,14 @@ class Registry(Mapping[str, T], Generic[T]):
 
     Args:
         what: the kind of thing, in the singular: for messages and for the group of entry points.
-        entries: ours: the thing, or "module:attribute".
+        entries: ours: the thing, or "module:attribute". A name that another package adds too stays ours.
+        kind: class of the things; None for any.
     """
 
-    def __init__(self, what: str, entries: Mapping[str, T | str]) -> None:
-        self.what = what
+    def __init__(self, what: str, entries: Mapping[str, T | str], kind: type | None = None) -> None:
+        self.what, self.kind = what, kind
         self._own: dict[str, T | str] = dict(entries)
+        self._loaded: dict[str, T] = {}
 
     @cached_property
     def _added(self) -> dict[str, metadata.EntryPoint]:
@@ -50,20 +52,24 @@ class Registry(Mapping[str, T], Generic[T]):
         Raises:
             InputError: unknown, or another package's that cannot be loaded.
         """
+        if name in self._loaded:
+            return self._loaded[name]
         if name in self._own:
-            entry = self._own[name]
-            if isinstance(entry, str):
-                entry = self._own[name] = cast(T, load(entry))
-            return entry
-        if name in self._added:
+            entry, package = self._own[name], "orient-eye"
+        elif name in self._added:
             point = self._added[name]
-            try:
-                found = self._own[name] = cast(T, point.load())
-            except Exception as error:
-                package = point.dist.name if point.dist else point.module
-                raise InputError(f"{self.what} {name!r} of package {package} cannot be loaded: {error}") from error
-            return found
-        raise InputError(f"unknown {self.what} {name!r}; choose one of {', '.join(self)}")
+            entry, package = point.value, point.dist.name if point.dist else point.module
+        else:
+            raise InputError(f"unknown {self.what} {name!r}; choose one of {', '.join(self)}")
+        try:
+            found = load(entry) if isinstance(entry, str) else entry
+        except Exception as error:
+            raise InputError(f"{self.what} {name!r} of package {package} cannot be loaded: {error}") from error
+        if self.kind is not None and not isinstance(found, self.kind):
+            got, wanted = type(found).__name__, self.kind.__name__
+            raise InputError(f"{self.what} {name!r} of package {package} is a {got}; it must be a {wanted}")
+        self._loaded[name] = cast(T, found)
+        return self._loaded[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(dict.fromkeys((*self._own, *self._added)))

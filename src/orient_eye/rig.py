@@ -9,6 +9,7 @@ over its motors by m_i = c_i u / sum of c^2, the least movement that makes it. T
 m [deg] is zero + sign * m * units_per_deg.
 """
 
+import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -294,15 +295,16 @@ _HEAD = """\
 
 def to_toml(rig: Rig) -> str:
     """A rig as TOML, every key there, those not known as comments."""
-    lines = [_HEAD, f"name = {_text(rig.name)}", f"command_rate_hz = {rig.command_rate_hz:g}  # new positions a second"]
+    rate = f"command_rate_hz = {rig.command_rate_hz!r}  # new positions a second"
+    lines = [_HEAD, f"name = {quoted(rig.name)}", rate]
     if rig.notes:
-        lines.append(f"notes = {_text(rig.notes)}")
+        lines.append(f"notes = {quoted(rig.notes)}")
     for motor in rig.motors:
         lines += [
             "",
             "[[motors]]",
-            f"name = {_text(motor.name)}",
-            f"unit = {_text(motor.unit)}  # of the driver: deg, rad or counts",
+            f"name = {quoted(motor.name)}",
+            f"unit = {quoted(motor.unit)}  # of the driver: deg, rad or counts",
         ]
         if motor.counts_per_deg is not None:
             lines.append(f"counts_per_deg = {motor.counts_per_deg!r}")
@@ -321,10 +323,10 @@ def to_toml(rig: Rig) -> str:
             lines.append(f"# {key} = {example!r}  # {unit}" if value is None else f"{key} = {value!r}  # {unit}")
     lines += ["", "[axes]  # what turns the eye: for each axis, its drive as a weighted sum of motors"]
     for axis, drive in rig.axes.items():
-        lines.append(f"{axis} = {{ {', '.join(f'{_text(n)} = {c!r}' for n, c in drive.items())} }}")
+        lines.append(f"{axis} = {{ {', '.join(f'{quoted(n)} = {c!r}' for n, c in drive.items())} }}")
     return "\n".join(lines) + "\n"
 
 
-def _text(value: str) -> str:
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
+def quoted(value: str) -> str:
+    """A text as TOML writes it."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML escapes as JSON, and this too

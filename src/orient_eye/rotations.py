@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from orient_eye.constants import ANGLES
+
 Array = NDArray[np.float64]
 FORWARD = np.array([1.0, 0.0, 0.0, 0.0])
 """Orientation of the eye that looks straight ahead."""
@@ -19,7 +21,7 @@ def rotation(orientation: ArrayLike) -> Rotation:
     return Rotation.from_quat(np.asarray(orientation, dtype=float), scalar_first=True)
 
 
-AXES = {"yaw": 2, "pitch": 1, "roll": 0}
+AXES = dict(zip(ANGLES, (2, 1, 0), strict=True))
 """An angle, and the axis it turns about among x, y, z."""
 
 

@@ -17,9 +17,8 @@ class State:
 
     Attributes:
         orientation: unit quaternions w, x, y, z, (saccades, 4); normalised here.
-        motor: positions of all motors of the plant, in their units, (saccades, motors).
+        motor: positions of all motors of the plant, which rest there, in their units, (saccades, motors).
         angular_velocity: head frame [deg/s], (saccades, 3); unless given, at rest.
-        motor_velocity: [unit/s], (saccades, motors); unless given, at rest.
 
     Raises:
         InputError: shapes that do not fit, or a zero quaternion.
@@ -28,33 +27,27 @@ class State:
     orientation: Array
     motor: Array
     angular_velocity: Array = None  # type: ignore[assignment]  # never None once made
-    motor_velocity: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         orientation, motor = (np.asarray(a, dtype=float) for a in (self.orientation, self.motor))
         velocity = np.zeros((len(orientation), 3)) if self.angular_velocity is None else self.angular_velocity
-        motor_velocity = np.zeros(motor.shape) if self.motor_velocity is None else self.motor_velocity
-        velocity, motor_velocity = np.asarray(velocity, float), np.asarray(motor_velocity, float)
+        velocity = np.asarray(velocity, dtype=float)
         count = len(orientation)
-        shapes = (orientation.shape, velocity.shape, motor.shape[:1], motor_velocity.shape)
-        if shapes != ((count, 4), (count, 3), (count,), motor.shape) or motor.ndim != 2:
+        shapes = (orientation.shape, velocity.shape, motor.shape[:1])
+        if shapes != ((count, 4), (count, 3), (count,)) or motor.ndim != 2:
             raise InputError(
                 f"a state of {count} eyes has orientations ({count}, 4), angular velocities ({count}, 3) and motor "
-                f"positions and velocities ({count}, motors), got {orientation.shape}, {velocity.shape}, "
-                f"{motor.shape}, {motor_velocity.shape}"
+                f"positions ({count}, motors), got {orientation.shape}, {velocity.shape} and {motor.shape}"
             )
         object.__setattr__(self, "orientation", unit(orientation))
         object.__setattr__(self, "motor", motor)
         object.__setattr__(self, "angular_velocity", velocity)
-        object.__setattr__(self, "motor_velocity", motor_velocity)
 
     def __len__(self) -> int:
         return len(self.orientation)
 
     def __getitem__(self, which: NDArray[np.intp] | slice | list[int]) -> "State":
-        return State(
-            self.orientation[which], self.motor[which], self.angular_velocity[which], self.motor_velocity[which]
-        )
+        return State(self.orientation[which], self.motor[which], self.angular_velocity[which])
 
     def to_plain(self) -> dict[str, Any]:
         """Plain values, for JSON."""
@@ -63,12 +56,14 @@ class State:
     @classmethod
     def from_plain(cls, content: dict[str, Any]) -> "State":
         """The state that `to_plain` wrote."""
+        if not content["orientation"]:
+            return cls(np.empty((0, 4)), np.empty((0, 0)))
         return cls(**{name: np.array(content[name], dtype=float) for name in cls.__dataclass_fields__})
 
     @property
     def finite(self) -> NDArray[np.bool_]:
         """Whether all numbers of each eye are finite, (saccades,)."""
-        parts = (self.orientation, self.motor, self.angular_velocity, self.motor_velocity)
+        parts = (self.orientation, self.motor, self.angular_velocity)
         return np.asarray(np.isfinite(np.concatenate(parts, axis=1)).all(axis=1))
 
 

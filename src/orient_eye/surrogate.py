@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from orient_eye.constants import ANGLES
 from orient_eye.errors import InputError
 from orient_eye.files import write_text
 from orient_eye.motor import Motor
@@ -20,7 +21,6 @@ from orient_eye.resources import data_folder
 
 _FORMATS = ("orient-eye surrogate 2", "orient-eye surrogate 1")
 _LARGEST_BYTES = 16 * 2**20
-AXES = ("yaw", "pitch", "roll")
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,13 @@ class Surrogate:
             raise InputError(f"a surrogate needs a finite gain K != 0 and positive w0, or wn and zeta, got {told}")
         if not 0 <= self.dead_time < np.inf:
             raise InputError(f"the dead time is not negative, got {self.dead_time} s")
-        if self.axis not in AXES:
+        if self.axis not in ANGLES:
             raise InputError(f"an axis is yaw, pitch or roll, got {self.axis!r}")
         for name in ("range", "amplitudes"):
             value = getattr(self, name)
             object.__setattr__(self, name, None if value is None else (float(value[0]), float(value[1])))
+        intervals = {str(name): (float(ends[0]), float(ends[1])) for name, ends in dict(self.intervals).items()}
+        object.__setattr__(self, "intervals", intervals)
         self.as_motor()  # which checks range and limits
 
     def as_motor(self, working: tuple[float, float] = (-np.inf, np.inf)) -> Motor:
@@ -115,8 +117,6 @@ class Surrogate:
                 raise ValueError(f"its format is not {_FORMATS[0]!r}")
             return cls(**content)
         except (OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            if isinstance(error, InputError):
-                raise
             raise InputError(
                 f"{path} is no surrogate ({error}); give a surrogate.json written by orient-eye sysid, "
                 f"or a shipped one: {', '.join(shipped)}"

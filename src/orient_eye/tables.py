@@ -70,7 +70,8 @@ class Table:
             k = int(falls[0])
             raise InputError(
                 f"{self.path}, line {self.lines[k + 1]}: time must rise from row to row, but {name} = "
-                f"{time[k + 1]:g} follows {time[k]:g}; sort the rows and remove repeated ones"
+                f"{time[k + 1]:g} follows {time[k]:g}; sort the rows"
+                + (" and remove repeated ones" if strictly else "")
             )
         return time
 
@@ -90,8 +91,8 @@ def read_lines(path: str | Path) -> list[tuple[int, str]]:
         text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except (OSError, ValueError) as error:
         raise InputError(f"cannot read {path}: {error}; give a text file") from error
-    lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), start=1)]
-    return [(i, line) for i, line in lines if line and not line.startswith("#")]
+    lines = enumerate(text.splitlines(), start=1)
+    return [(i, line) for i, line in lines if line.strip(" ") and not line.lstrip().startswith("#")]
 
 
 def read_table(path: str | Path, example: str) -> Table:
@@ -112,7 +113,10 @@ def table_of(path: str | Path, lines: list[tuple[int, str]], example: str) -> Ta
     if not lines:
         raise InputError(f"{path} is empty; it needs a header ({example}) and rows of numbers below")
     separator = max((",", ";", "\t"), key=lines[0][1].count)
-    header = [name.strip() for name in next(csv.reader([lines[0][1]], delimiter=separator))]
+    try:
+        header = [name.strip() for name in next(csv.reader([lines[0][1]], delimiter=separator))]
+    except csv.Error as error:
+        raise InputError(f"{path} has no header that can be read ({error}); it needs {example}") from error
     if len(set(header)) != len(header):
         raise InputError(f"{path}: a column stands twice in the header {', '.join(header)}; name each once")
     if all(_number(name, separator) is not None for name in header):
@@ -146,6 +150,8 @@ def numbers(path: str | Path, header: tuple[str, ...], lines: list[tuple[int, st
 
 def _number(cell: str, separator: str | None) -> float | None:
     text = cell.strip().strip('"')
+    if "_" in text:  # which Python reads as a separator of thousands
+        return None
     try:
         return float(text if separator == "," else text.replace(",", "."))
     except ValueError:

@@ -27,6 +27,7 @@ COMMANDS = {
     "train": "orient_eye.cli.train:Train",
     "models": "orient_eye.cli.models:Models",
     "predict": "orient_eye.cli.predict:Predict",
+    "check": "orient_eye.cli.check:Check",
     "evaluate": "orient_eye.cli.evaluate:Evaluate",
     "export": "orient_eye.cli.export:Export",
     "optimum": "orient_eye.cli.optimum:Optimum",

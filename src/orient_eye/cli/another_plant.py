@@ -1,5 +1,6 @@
 """Options that predict and evaluate share: a policy on another plant than its own."""
 
+import json
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AnotherPlant:
-    """To use the policy on another plant than its own."""
+    """To use the policy on another plant than its own, or on a rig (--rig alone: its own plant with those limits)."""
 
     plant: Annotated[str | None, tyro.conf.arg(help_behavior_hint="(default: the policy's own)")] = None
     """The plant; one the policy was not trained on is refused without --force."""
@@ -27,9 +28,17 @@ class AnotherPlant:
             InputError: something differs, and it is not forced.
         """
         from orient_eye.cli.tables import say
-        from orient_eye.plants import make_plant
+        from orient_eye.plants import make_plant, restore_plant
+        from orient_eye.run_directory import plain
 
-        plant = None if self.plant is None else make_plant(self.plant, **self.plant_options)
+        own = policy.manifest["task"]["plant"]
+        plant = None
+        if self.plant is not None:
+            plant = make_plant(self.plant, **self.plant_options)
+        elif self.plant_options:  # of its own plant only the limits can be others
+            plant = restore_plant(own, **self.plant_options)
+            same = json.loads(json.dumps(plant.identity(), default=plain)) == own
+            plant = None if same else plant
         task = policy.task(plant)
         differences = policy.require(task, force=self.force)
         if differences:

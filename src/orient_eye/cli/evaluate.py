@@ -81,6 +81,7 @@ def _measure(policy: "Policy", pairs: "Yardstick", table: "Yardstick", path: Pat
     """The numbers of result.json; pairs.csv is written on the way."""
     import numpy as np
 
+    from orient_eye.cli.tables import say_limits, with_peaks
     from orient_eye.files import write_table
     from orient_eye.learning.evaluation import amplitude_table, gap_summary
     from orient_eye.task.table import outcome_columns, rows_of
@@ -91,7 +92,9 @@ def _measure(policy: "Policy", pairs: "Yardstick", table: "Yardstick", path: Pat
     ours = outcome_columns(task, start, target, action, outcome)
     others = outcome_columns(task, start, target, best, task.perform(start, best, target))
     beside = {f"{key}_best": v for key, v in others.items() if not key.startswith(("start_", "target_", "F_"))}
-    write_table(path, rows_of({**ours, "gap": gap, **beside}))
+    rows = with_peaks(task, outcome, rows_of({**ours, "gap": gap}))
+    write_table(path, [row | more for row, more in zip(rows, rows_of(beside), strict=True)])
+    say_limits(task, rows)
     errors: dict[str, float] = {}
     for angle in task.targets.angles:
         off = np.abs(ours[f"final_{angle.replace('_deg', '_error_deg')}"])
@@ -102,6 +105,8 @@ def _measure(policy: "Policy", pairs: "Yardstick", table: "Yardstick", path: Pat
         **errors,
         "overshoot_max": float(np.nanmax(outcome.measures.overshoot)),
         "failed_saccades": int(outcome.measures.failed.sum()),
+        "limited_saccades": int(outcome.limited.sum()),
+        "too_fast_saccades": int(outcome.too_fast.sum()),
         "table": amplitude_table(table, policy.act),
     }
 

@@ -54,7 +54,7 @@ class Optimum:
     def run(self) -> dict[str, Any]:
         """Search, or remember, and print the table."""
         from orient_eye.cli.places import check_outputs
-        from orient_eye.cli.tables import column, saccade_columns, say, table
+        from orient_eye.cli.tables import column, saccade_columns, say, say_limits, table, with_peaks
         from orient_eye.task.table import outcome_rows
         from orient_eye.task.targets import saccades
 
@@ -65,7 +65,8 @@ class Optimum:
         _refuse_no_saccade(start, target)
         task = self.problem.task(plant, targets, case, self.weights)
         best, remembered = self._search(task, start, target)
-        rows = outcome_rows(task, start, target, best.action, task.perform(start, best.action, target))
+        outcome = task.perform(start, best.action, target)
+        rows = with_peaks(task, outcome, outcome_rows(task, start, target, best.action, outcome))
         result: dict[str, Any] = {
             "task": task.identity(),
             "weights_from": task.weights_from,
@@ -82,6 +83,7 @@ class Optimum:
             columns["second search"] = column("check_gain", "+.4f", " %", 100)
         named = f"case {case}" if isinstance(case, str) else f"pulse {case.pulse}"
         say(table(f"The best saccades on plant {plant.name}, {named}, with the weighted terms: {what}.", columns, rows))
+        say_limits(task, rows)
         if self.check:
             say(
                 f"second search: better by at most {100 * result['check_largest_gain']:.2g} %, worse by at most "

@@ -26,6 +26,8 @@ from orient_eye.task.target_sets import TARGETS
 T = TypeVar("T")
 REGISTRIES: dict[str, Registry[Any]] = {"plant": PLANTS, "case": CASES, "targets": TARGETS, "pulse": PULSES}
 """Field of a command to where its names stand."""
+_RIG = "rig"
+"""The option of a plant that also says something of a policy's own plant, and that a command may have as its own."""
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
 
 
@@ -97,6 +99,8 @@ def _plant_options(taken: frozenset[str]) -> type:
     found: dict[str, list[tuple[str, Option]]] = {}
     for plant, option in _options_of_plants():
         others = found.setdefault(option.name, [])
+        if option.name == _RIG and option.name in taken:
+            continue  # the command's own says it all
         if option.name in taken or any(_kind(other) != _kind(option) for _, other in others):
             say(f"note: plant {plant!r} cannot have its option {_flag(option.name)}: another is of that name", "yellow")
         else:
@@ -160,9 +164,12 @@ def _given(plant: str | None, parsed: Any) -> dict[str, Any]:
         InputError: one that the plant has not.
     """
     options = {f.name: getattr(parsed, f.name) for f in fields(parsed) if getattr(parsed, f.name) != f.default}
-    if options and plant is None:
-        raise InputError(f"{_flag(next(iter(options)))} says more about a plant; name the plant too, by --plant")
-    has = {option.name for option in PLANTS[plant].options} if options and plant is not None else set()
+    unsaid = [name for name in options if name != _RIG] if plant is None else []
+    if unsaid:
+        raise InputError(f"{_flag(unsaid[0])} says more about a plant; name the plant too, by --plant")
+    if plant is None or not options:
+        return options
+    has = {option.name for option in PLANTS[plant].options}
     for name in options:
         if name not in has:
             raise InputError(f"{_flag(name)} does nothing on plant {plant!r}; leave it out or choose another plant")

@@ -10,6 +10,9 @@ from orient_eye.cli.another_plant import AnotherPlant
 from orient_eye.cli.saccades import Saccades
 
 if TYPE_CHECKING:
+    from orient_eye.cli.command_files import Written
+    from orient_eye.commands.motor_file import Wiring
+    from orient_eye.state import State
     from orient_eye.task.saccade import Outcome, SaccadeTask
 
 _OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
@@ -29,6 +32,13 @@ class Predict:
     $ orient-eye simulate --motor saccade.csv
 
     $ orient-eye predict runs/my-run --pairs pairs.csv --out predicted.csv
+
+    With --rig the motors have the rig's limits, and commands are what its motor driver takes: its units, at its rate,
+    until the motors stand.
+
+    $ orient-eye predict runs/my-run --rig rig.toml --target 20 --command there.csv --back back.csv
+
+    $ orient-eye predict runs/my-run --rig rig.toml --pairs pairs.csv --commands commands
     """
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
@@ -36,6 +46,10 @@ class Predict:
     saccades: Saccades = field(default_factory=Saccades)
     command: Annotated[Path | None, _OPTIONAL] = None
     """CSV file to write: the motor command of the one saccade, as `orient-eye simulate --motor` reads it."""
+    commands: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(optional)")] = None
+    """Folder to write, new or empty: the motor command of each saccade, and index.csv with the table."""
+    back: Annotated[Path | None, _OPTIONAL] = None
+    """CSV file to write: a slow, smooth way back from where the one saccade ends to rest, at half the limits."""
     out: Annotated[Path | None, _OPTIONAL] = None
     """CSV file to write: the result, one row a saccade."""
     another_plant: AnotherPlant = field(default_factory=AnotherPlant)
@@ -43,56 +57,124 @@ class Predict:
     def run(self) -> dict[str, Any]:
         """Predict, write the files and print the table."""
         from orient_eye.cli.places import check_outputs, policy_file
-        from orient_eye.cli.tables import saccade_columns, say, table
-        from orient_eye.errors import InputError
+        from orient_eye.cli.tables import saccade_columns, say, say_limits, table, with_peaks
         from orient_eye.files import write_table
         from orient_eye.learning.policy import Policy
+        from orient_eye.plants.limits import wiring
         from orient_eye.task.table import outcome_rows
         from orient_eye.task.targets import saccades
         from orient_eye.words import plant_in_words
 
         policy = Policy.load(self.policy)
         inputs = {"--pairs": self.saccades.pairs, "the policy": policy_file(self.policy)}
-        check_outputs({"--command": self.command, "--out": self.out}, inputs)
+        check_outputs({"--command": self.command, "--out": self.out, "--back": self.back}, inputs)
         task, differences = self.another_plant.task(policy)
         ends = self.saccades.angles(task.targets, drawn=True)
-        if self.command and len(ends[0]) != 1:
-            raise InputError(
-                f"--command writes the motor command of one saccade, {self.saccades.pairs} has {len(ends[0])}"
-            )
+        self._check_files(len(ends[0]))
+        rig, writes = self.another_plant.plant_options.get("rig"), self.command or self.commands or self.back
+        wired = wiring(task.plant, rig) if rig is not None and writes else None
         start, target = saccades(task.targets, *ends)
         action = policy.act(start.orientation, target)
         outcome = task.perform(start, action, target)
-        rows = outcome_rows(task, start, target, action, outcome)
+        rows = with_peaks(task, outcome, outcome_rows(task, start, target, action, outcome))
         title = f"What the policy does on plant {plant_in_words(task.plant.identity())}."
         say(table(title, saccade_columns(task, rows[0]), rows))
+        say_limits(task, rows)
         if outcome.measures.failed.any():
             say(f"{int(outcome.measures.failed.sum())} simulated saccades failed: their measures are empty", "red")
         if self.out:
             say(f"in {write_table(self.out, rows)}")
-        if self.command:
-            _write_command(self.command, task, outcome)
-            say(f"motor command in {self.command}: orient-eye simulate --motor {self.command}")
+        written = self._write(task, outcome, start, rows, wired)
         return {
             "policy": self.policy,
             "plant": task.plant.identity(),
             "differs_from_training": differences,
             "saccades": rows,
-            "out": str(self.out) if self.out else None,
-            "command": str(self.command) if self.command else None,
+            "written": [each.to_plain() for each in written],
+            **{name: str(path) if path else None for name, path in self._files().items()},
         }
 
+    def _files(self) -> dict[str, Path | None]:
+        return {"out": self.out, "command": self.command, "commands": self.commands, "back": self.back}
 
-def _write_command(path: Path, task: "SaccadeTask", outcome: "Outcome") -> None:
-    """The motor command of one saccade at the plant's step, cut off at the motors' range; first the rest position."""
-    import numpy as np
+    def _check_files(self, saccades: int) -> None:
+        """Refuse one file of many saccades, and a folder that holds something.
 
-    from orient_eye.commands.motor_file import write_command
-    from orient_eye.errors import InputError
-    from orient_eye.motor import ranges
+        Raises:
+            InputError: says which.
+        """
+        from orient_eye.errors import InputError
 
-    if outcome.measures.failed[0]:
-        raise InputError("the saccade failed, so there is no motor command to write; leave --command out")
-    trajectory = outcome.movement.trajectory()
-    low, high = ranges(task.plant.motors).T
-    write_command(path, task.plant.motors, trajectory.time, np.clip(trajectory.command[0], low, high))
+        for option, path, what in (
+            ("--command", self.command, "the motor command"),
+            ("--back", self.back, "the way back"),
+        ):
+            if path and saccades != 1:
+                raise InputError(
+                    f"{option} writes {what} of one saccade, {self.saccades.pairs} has {saccades}; --commands FOLDER "
+                    "writes the commands of many"
+                )
+        if (
+            self.commands
+            and self.commands.exists()
+            and not (self.commands.is_dir() and next(self.commands.iterdir(), None) is None)
+        ):
+            raise InputError(f"--commands {self.commands} is not an empty folder; name a new one")
+
+    def _write(
+        self,
+        task: "SaccadeTask",
+        outcome: "Outcome",
+        start: "State",
+        rows: list[dict[str, Any]],
+        wired: "Wiring | None",
+    ) -> "list[Written]":
+        """Write the commands that are asked for."""
+        from orient_eye.cli.command_files import final_of, way_back, write, written_path
+        from orient_eye.cli.tables import say
+
+        written, plant = [], task.plant
+        rig = "" if wired is None else f" --plant {plant.name} --rig {self.another_plant.plant_options['rig']}"
+        if self.command:
+            written.append(write(self.command, plant, wired, written_path(task, outcome, start, 0, wired)))
+            written[-1].say("motor command")
+            say(f"to try it: orient-eye simulate --motor {self.command}{rig}")
+        if self.back:
+            motors, step_s = (plant.motors, plant.step_s) if wired is None else (wired.limited, wired.step_s)
+            back = way_back(final_of(plant, outcome, 0), motors, step_s)
+            written.append(write(self.back, plant, wired, back))
+            written[-1].say("way back to rest")
+        if self.commands:
+            written += self._write_all(self.commands, task, outcome, start, rows, wired)
+        return written
+
+    def _write_all(
+        self,
+        folder: Path,
+        task: "SaccadeTask",
+        outcome: "Outcome",
+        start: "State",
+        rows: list[dict[str, Any]],
+        wired: "Wiring | None",
+    ) -> "list[Written]":
+        """One file a saccade, but for those that failed, and index.csv."""
+        from orient_eye.cli.command_files import write, written_path
+        from orient_eye.cli.tables import say
+        from orient_eye.files import write_table
+
+        written, index = [], []
+        digits = len(str(len(rows)))
+        for i, row in enumerate(rows):
+            if row["failed"]:
+                index.append({"file": None, "rows": None, "command_s": None, **row})
+                continue
+            path = folder / f"saccade-{i + 1:0{digits}d}.csv"
+            each = write(path, task.plant, wired, written_path(task, outcome, start, i, wired))
+            index.append({"file": path.name, "rows": each.rows, "command_s": (each.rows - 1) * each.step_s, **row})
+            written.append(each)
+        write_table(folder / "index.csv", index)
+        say(f"{len(written)} motor commands in {folder}, listed in {folder / 'index.csv'}")
+        beyond = [each.file.name for each in written if each.too_fast]
+        if beyond:
+            say(f"beyond their motors' limits: {', '.join(beyond)}", "red")
+        return written

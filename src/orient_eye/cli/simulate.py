@@ -17,6 +17,11 @@ class Simulate:
     $ orient-eye simulate --motor command.csv
 
     $ orient-eye simulate --motor command.csv --plant tavares --gravity
+
+    With --rig the motors have the rig's limits, and the file may have the columns of its driver (motor2_counts), as
+    `orient-eye predict --rig` writes them.
+
+    $ orient-eye simulate --motor there.csv --plant lpf --surrogate surrogate.json --rig rig.toml
     """
 
     motor: Path
@@ -34,10 +39,13 @@ class Simulate:
         import numpy as np
 
         from orient_eye.cli.tables import say
-        from orient_eye.commands.motor_file import LONGEST_S, read_command
+        from orient_eye.commands.motor_file import read_command
+        from orient_eye.constants import LONGEST_S
         from orient_eye.errors import InputError
         from orient_eye.figures.trajectory import draw_trajectory
         from orient_eye.plants import make_plant
+        from orient_eye.plants.limited_motor import peaks
+        from orient_eye.plants.limits import wiring
         from orient_eye.recording import record
         from orient_eye.rotations import to_euler
         from orient_eye.run_directory import RunDirectory
@@ -46,7 +54,9 @@ class Simulate:
         if self.horizon is not None and not 0 < self.horizon <= LONGEST_S:
             raise InputError(f"--horizon lies between 0 and {LONGEST_S:g} s, got {self.horizon:g}")
         plant = make_plant(self.plant, **self.plant_options)
-        command = read_command(self.motor, plant.motors)
+        rig = self.plant_options.get("rig")
+        wired = None if rig is None else wiring(plant, rig)
+        command = read_command(self.motor, plant.motors, wired, horizon_s=self.horizon)
         movement = plant.move(command, State(plant.rest(command.rest), command.rest), self.horizon)
         trajectory = movement.trajectory()
         run = RunDirectory.create(self.out, "simulate", self)
@@ -63,6 +73,18 @@ class Simulate:
         failed = bool(trajectory.failed[0])
         last = [float(np.round(angle[0, -1], 6)) for angle in to_euler(trajectory.orientation)]
         speed = float(np.linalg.norm(trajectory.angular_velocity[0], axis=-1).max())
+        told, taken = command.peaks(), peaks(trajectory.motor, plant.step_s)
+        motors = {
+            motor.name: {
+                "told_speed_deg_s": float(told[0][i]),
+                "told_acceleration_deg_s2": float(told[1][i]),
+                "peak_speed_deg_s": float(taken[0][0, i]),
+                "peak_acceleration_deg_s2": float(taken[1][0, i]),
+                "speed_limit_deg_s": motor.speed_limit,
+                "acceleration_limit_deg_s2": motor.acceleration_limit,
+            }
+            for i, motor in enumerate(plant.motors)
+        }
         result = {
             "out": str(run.path),
             "plant": plant.identity(),
@@ -70,6 +92,9 @@ class Simulate:
             "duration_s": float(trajectory.time[-1]),
             "final_yaw_pitch_roll_deg": None if failed else last,
             "peak_speed_deg_s": None if failed else speed,
+            "limited": bool(movement.limited[0]),
+            "saturated": bool(movement.saturated[0]),
+            "motors": motors,
             "failed": failed,
         }
         run.write_json("result.json", result)
@@ -77,5 +102,29 @@ class Simulate:
             say("the simulation diverged: the trajectory is empty (NaN)", "red")
         else:
             say(f"the eye ends at yaw {last[0]:.3f}, pitch {last[1]:.3f}, roll {last[2]:.3f} deg")
+        _say_motors(motors, limited=bool(result["limited"]))
         say(f"in {run.path}: trajectory.csv, .npz, .png, .rrd (orient-eye view {run.path}/trajectory.rrd)")
         return result
+
+
+def _say_motors(motors: dict[str, dict[str, Any]], *, limited: bool) -> None:
+    """How fast each motor that moves is told to be and is, beside what it can; how hard, where there is a limit."""
+    from orient_eye.cli.tables import say
+
+    beyond = False
+    for name, of in motors.items():
+        if not of["told_speed_deg_s"] > 0:
+            continue
+        words = []
+        for what, unit in (("speed_deg_s", "deg/s"), ("acceleration_deg_s2", "deg/s²")):
+            told, limit = of[f"told_{what}"], of[what.replace("_deg", "_limit_deg")]
+            if limit is not None:
+                beyond |= told > limit * (1 + 1e-6)
+                words.append(f"told {told:.0f}, makes {of[f'peak_{what}']:.0f} of {limit:.0f} {unit}")
+            elif what == "speed_deg_s":
+                words.append(f"{of[f'peak_{what}']:.0f} deg/s (no limit)")
+        say(f"{name}: {'; '.join(words)}")
+    if beyond:
+        say("limited: the command is more than a motor can do, which goes after it as fast as it can", "yellow")
+    elif limited:
+        say("the command keeps the limits from row to row; between rows the motors bend its straight lines as they can")

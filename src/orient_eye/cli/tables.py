@@ -10,11 +10,11 @@ if TYPE_CHECKING:  # --help does not wait for rich
     from rich.table import Table
     from rich.text import Text
 
-    from orient_eye.task.saccade import SaccadeTask
+    from orient_eye.task.saccade import Outcome, SaccadeTask
 
 Row: TypeAlias = Mapping[str, Any]
 Cell: TypeAlias = "str | Text"
-_WIDTH = 160  # of a log file or a pipe: no wrapping at the 80 columns of a missing terminal
+_WIDTH = 200  # of a log file or a pipe: no wrapping at the 80 columns of a missing terminal
 
 
 def say(message: "str | Table" = "", style: str = "") -> None:
@@ -88,12 +88,11 @@ def saccade_columns(task: "SaccadeTask", row: Row, *, terms: bool = False) -> di
         columns[f"{name} [{told_of.unit}]"] = column(name if name in row else f"{name}_{told_of.unit}")
     for key in row:
         if key == "C" or key.startswith("C_"):
-            columns[f"{key} [1/s]"] = lambda row, key=key: (
-                number(row[key], ".4g")
-                + (  # type: ignore[misc]
-                    " (too fast)" if row["too_fast"] else ""
-                )
-            )
+            columns[f"{key} [1/s]"] = _onset(key)
+    for what, (key, unit) in _PEAKS.items():
+        peaks = [(name, f"{key}_limit{name.removeprefix(key)}") for name in row if _is_peak(name, key)]
+        if peaks and (key == "motor_speed" or any(row[limit] is not None for _, limit in peaks)):
+            columns[f"{what} [{unit}]"] = _beside(peaks)
     columns["reward"] = column("reward", ".0f")
     if terms:
         columns |= {name: column(f"reward_{name}", ".0f") for name in task.weights}
@@ -104,3 +103,82 @@ def saccade_columns(task: "SaccadeTask", row: Row, *, terms: bool = False) -> di
         "peak velocity": column("peak_velocity_deg_s", ".0f", " deg/s"),
         "goes beyond": column("overshoot", ".4f", " %", 100),
     }
+
+
+_PEAKS = {"motor speed": ("motor_speed", "deg/s"), "motor acc.": ("motor_acceleration", "deg/s²")}
+"""Heading to key and unit; the columns are motor_speed_deg_s, motor_speed_limit_deg_s, of several with their names."""
+
+
+def _is_peak(name: str, key: str) -> bool:
+    return name.startswith(f"{key}_") and not name.startswith(f"{key}_limit_")
+
+
+def _onset(key: str) -> Callable[[Row], Cell]:
+    """C, in red where it cannot hold the command to the speed limit."""
+
+    def cell(row: Row) -> Cell:
+        from rich.text import Text
+
+        told = number(row[key], ".4g")
+        return Text(f"{told}\ntoo fast", "red") if row["too_fast"] else told
+
+    return cell
+
+
+def _beside(told: Sequence[tuple[str, str]]) -> Callable[[Row], Cell]:
+    """What motors do beside what they can, marked where that changed the command; keys of both."""
+
+    def cell(row: Row) -> Cell:
+        from rich.text import Text
+
+        words = [
+            number(row[key], ".0f") + ("" if row[limit] is None else f" of {row[limit]:.0f}") for key, limit in told
+        ]
+        return Text("\n".join((*words, "limited")), "yellow") if row["limited"] else "\n".join(words)
+
+    return cell
+
+
+def with_peaks(task: "SaccadeTask", outcome: "Outcome", rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Rows of `orient_eye.task.table.outcome_rows` with how fast and hard their motors move, and how much they can.
+
+    Args:
+        task: whose saccades they are.
+        outcome: of them.
+        rows: of the same saccades.
+    """
+    import numpy as np
+
+    from orient_eye.plants.limited_motor import peaks
+
+    motors = task.plant.motors
+    speed, acceleration = peaks(outcome.movement.trajectory().motor, task.plant.step_s)
+    driven = [i for i, motor in enumerate(motors) if motor.name in {n.motor for n in task.actions.numbers}]
+    made = [dict(row) for row in rows]
+    for i in driven:
+        name, motor = f"_{motors[i].name}" if len(driven) > 1 else "", motors[i]
+        for key, unit, values, limit in (
+            ("motor_speed", "deg_s", speed[:, i], motor.speed_limit),
+            ("motor_acceleration", "deg_s2", acceleration[:, i], motor.acceleration_limit),
+        ):
+            for row, value in zip(made, values, strict=True):
+                row[f"{key}{name}_{unit}"] = float(value) if np.isfinite(value) else None
+                row[f"{key}_limit{name}_{unit}"] = limit
+    return made
+
+
+def say_limits(task: "SaccadeTask", rows: Sequence[Row]) -> None:
+    """In words what a limit did to the commands of saccades; nothing where none did anything."""
+    count = {name: sum(bool(row[name]) for row in rows) for name in ("too_fast", "limited", "saturated")}
+    if count["too_fast"]:
+        V = getattr(task.actions, "speed_limit", None)
+        limit = "its speed limit" if V is None else f"the speed limit of {V:g} deg/s"
+        say(f"too fast: no C holds {count['too_fast']} of {len(rows)} commands to {limit}", "red")
+    if count["limited"]:
+        say(
+            f"limited: in {count['limited']} of {len(rows)} saccades the motors cannot do what the command says, and "
+            "go after it as fast as they can",
+            "yellow",
+        )
+    if count["saturated"]:
+        say(f"saturated: {count['saturated']} of {len(rows)} commands are cut off at the motors' range", "yellow")

@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from orient_eye.learning.config import TrainConfig
+
+if TYPE_CHECKING:
+    from orient_eye.task.saccade import SaccadeTask
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,8 @@ class Train:
     $ orient-eye train
 
     $ orient-eye train --plant mujoco --case 2-varying --out runs/my-run
+
+    $ orient-eye train --surrogate runs/sysid-1/surrogate.json --end-point-error 0.5 --robust
 
     $ orient-eye train --resume runs/my-run
     """
@@ -48,13 +53,46 @@ class Train:
             if self.resume:
                 result = resume(self.resume, quiet=self.quiet, checkpoint_s=self.checkpoint_every)
             else:
-                result = train(self.config, self.out, quiet=self.quiet, checkpoint_s=self.checkpoint_every)
+                result = train(
+                    self.config, self.out, quiet=self.quiet, checkpoint_s=self.checkpoint_every, begun=_say_task
+                )
         except Interrupted as stopped:
             say(str(stopped))
             raise SystemExit(stopped.code) from None
-        if self.config.weights is None:
-            say(f"weights of the reward: {result['weights_from']}")
         say_result(result)
+        if "robust" in result:
+            _say_robust(result)
         say(f"in {result['out']}: policy.png, learning.png, recording.rrd")
         say(f"look at the saccades: orient-eye view {result['out']}/recording.rrd")
         return result
+
+
+def _say_task(task: "SaccadeTask") -> None:
+    """Bounds, weights, where they are from, and how they differ from the thesis'."""
+    from orient_eye.cli.tables import say
+    from orient_eye.task.known_weights import bounds, compared_with_thesis
+
+    units = dict(zip(task.actions.names, (n.unit for n in task.actions.numbers), strict=True))
+    told = (f"{name} from {low:.4g} to {high:.4g} {units[name]}" for name, (low, high) in bounds(task).items())
+    say(f"actions: {', '.join(told)}")
+    weights = ", ".join(f"{name} {value:.3g}" for name, value in task.weights.items())
+    say(f"weights of the reward: {weights}; {task.weights_from}")
+    say(compared_with_thesis(task))
+
+
+def _say_robust(result: dict[str, Any]) -> None:
+    """What robustness costs, and what it buys."""
+    from orient_eye.cli.tables import say
+
+    learned, nominal = result["robust"]["policy"], result["robust"]["best_of_nominal"]
+
+    def told(what: dict[str, float]) -> str:
+        return (
+            f"end point off by {what['error_deg_mean']:.2f} deg, at worst {what['error_deg_worst']:.2f}; overshoot "
+            f"{what['overshoot_mean']:.2%}, at worst {what['overshoot_worst']:.2%}; settles in "
+            f"{what['duration_ms_mean']:.0f} ms"
+        )
+
+    say(f"what robustness costs on the nominal plant: a mean reward gap of {result['gap_mean']:.2%}")
+    say(f"over the intervals ({result['robust']['eyes']} eyes): {told(learned)}")
+    say(f"the best actions for the nominal plant there: {told(nominal)}")

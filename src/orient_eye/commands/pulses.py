@@ -121,6 +121,7 @@ PULSES: Registry[Pulse] = Registry(
             Onset(3.6, _keeps3, _root3, lambda size, B, k0, V: B),
         ),
     },
+    Pulse,
 )
 """Name to pulse."""
 

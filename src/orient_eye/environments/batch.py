@@ -1,5 +1,6 @@
 """What the environments have in common: a batch of saccades, begun, performed and described."""
 
+import inspect
 from collections.abc import Mapping
 from typing import Any
 
@@ -55,10 +56,11 @@ def make_task(
         plant = make_plant(plant, **(plant_options or {}))
     elif plant_options:
         raise InputError("plant_options go with a plant's name; this plant is made already")
-    try:
-        return SaccadeTask.of_case(plant, **task_options)
-    except TypeError as error:
-        raise InputError(f"the environment knows no such option: {error}") from error
+    known = [name for name in inspect.signature(SaccadeTask.of_case).parameters if name != "plant"]
+    unknown = sorted(set(task_options) - set(known))
+    if unknown:
+        raise InputError(f"the environment has no option {', '.join(unknown)}; of a task it has {', '.join(known)}")
+    return SaccadeTask.of_case(plant, **task_options)
 
 
 class SaccadeBatch:
@@ -129,8 +131,14 @@ class SaccadeBatch:
             )
         return targets.rest(orientations[0]), unit(orientations[1])
 
-    def perform(self, scaled: NDArray[Any]) -> tuple[Array, NDArray[np.float32]]:
-        """Perform the saccades under actions in -1 .. 1, (saccades, numbers).
+    def perform(
+        self, scaled: NDArray[Any], random: np.random.Generator | None = None
+    ) -> tuple[Array, NDArray[np.float32]]:
+        """Perform the saccades.
+
+        Args:
+            scaled: actions in -1 .. 1, (saccades, numbers).
+            random: of a plant that is noisy.
 
         Returns:
             Rewards (saccades,), and observations of where the eyes came to rest (saccades, 8).
@@ -146,7 +154,7 @@ class SaccadeBatch:
         start, self.start = self.start, None
         self.began = start
         self.action = self.task.actions.from_unit(scaled)
-        outcome = self.task.perform(start, self.action, self.target)
+        outcome = self.task.perform(start, self.action, self.target, random)
         self.outcome = outcome
         total = outcome.reward.total
         final = np.where(outcome.measures.failed[:, None], start.orientation, outcome.measures.final)

@@ -101,7 +101,7 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Perform the saccade; the episode ends. The observation then shows where the eye came to rest."""
-        reward, observation = self.batch.perform(np.asarray(action, dtype=float)[None])
+        reward, observation = self.batch.perform(np.asarray(action, dtype=float)[None], self.np_random)
         info = rows_of(self.batch.described(), missing=np.nan)[0]
         if self.render_mode == "human":
             self.render()

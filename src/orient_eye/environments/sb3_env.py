@@ -51,6 +51,8 @@ class SaccadeVecEnv(VecEnv):
         infos: bool = True,
         **task_options: Any,
     ) -> None:
+        if saccades < 1:
+            raise InputError(f"a batch has at least one saccade, got {saccades}")
         if render_mode not in (None, "rgb_array"):
             raise InputError(f"SB3 renders 'rgb_array' or nothing, got {render_mode!r}")
         self.render_mode = check_render_mode(render_mode)
@@ -90,14 +92,14 @@ class SaccadeVecEnv(VecEnv):
         """
         if self._seeds[0] is not None:
             self.random = np.random.default_rng(self._seeds[0])
-        options = self._chosen()
+        given = [options or {} for options in self._options]
         self._reset_seeds()
         self._reset_options()
-        return self._draw(options)
+        return self._draw(self._as_one(given))
 
-    def _chosen(self) -> dict[str, Any] | None:
+    @staticmethod
+    def _as_one(each: list[dict[str, Any]]) -> dict[str, Any] | None:
         """The options of all saccades, as one."""
-        each = [options or {} for options in self._options]
         if any(set(options) != set(each[0]) for options in each):
             raise InputError("set_options: give the same keys for every saccade, or the same options for all")
         return {key: np.array([options[key] for options in each]) for key in each[0]} or None
@@ -108,7 +110,7 @@ class SaccadeVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Perform the saccades and begin new ones."""
-        rewards, ended = self.batch.perform(self._actions)
+        rewards, ended = self.batch.perform(self._actions, self.random)
         told = rows_of(self.batch.described(), missing=np.nan) if self.infos else [{} for _ in ended]
         infos: list[dict[str, Any]] = [
             {**row, "terminal_observation": final, "TimeLimit.truncated": False}

@@ -74,7 +74,7 @@ class SaccadeVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Perform the saccades (num_envs, numbers) and begin new ones."""
-        rewards, ended = self.batch.perform(np.asarray(actions, dtype=float))
+        rewards, ended = self.batch.perform(np.asarray(actions, dtype=float), self.np_random)
         every = np.ones(self.num_envs, bool)
         infos = {"final_obs": ended, "_final_obs": every, "final_info": self.batch.described(), "_final_info": every}
         observations = self.batch.draw(self.num_envs, self.np_random)

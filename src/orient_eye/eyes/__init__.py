@@ -37,5 +37,6 @@ EYES: Registry[Eye] = Registry(
         "thesis": Eye("the thesis' eye: three motors, six elastics", Path("eye3.xml")),
         "eve_v3": Eye("the group's second parameter set", Path("eye3.xml"), eve_v3),
     },
+    Eye,
 )
 """Name to eye."""

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from orient_eye.figures import DATA, MODEL, OTHER, tidy
 from orient_eye.sysid.identification import Identification
-from orient_eye.sysid.models import MODELS
 
 
 def figure_3_5(found: Identification) -> Figure:
@@ -17,7 +16,7 @@ def figure_3_5(found: Identification) -> Figure:
     figure = Figure(figsize=(10, 4), layout="constrained")
     amplitude = np.array([s.amplitude_deg for s in found.steps])
     order = amplitude.argsort()
-    chosen = {"K": found.surrogate.K, "w0": found.surrogate.w0}
+    chosen = {"K": found.surrogate.K, "w0": found.surrogate.w0}  # the latter None of second order
     labels = {"K": "K [deg of eye per deg of motor]", "w0": r"$\omega_0$ [rad/s]"}
     for axes, symbol in zip(figure.subplots(1, 2), labels, strict=True):
         estimates = [fits[0][symbol] for fits in found.fits]
@@ -29,7 +28,9 @@ def figure_3_5(found: Identification) -> Figure:
             label="95 % interval of the fit",
         )  # fmt: skip
         axes.plot(amplitude[order], value[order], "o-", color=DATA, ms=4, lw=1.2, label="fit of each step")
-        axes.axhline(chosen[symbol], color=MODEL, ls="--", label=f"surrogate: {chosen[symbol]:.4g}")
+        told = chosen[symbol]
+        if told is not None:
+            axes.axhline(told, color=MODEL, ls="--", label=f"surrogate: {told:.4g}")
         axes.set(xlabel="step amplitude [deg of motor]", ylabel=labels[symbol])
         axes.ticklabel_format(useOffset=False)
         tidy(axes)
@@ -47,11 +48,10 @@ def figure_3_6(found: Identification, shown: Sequence[int] | NDArray[np.intp]) -
     """
     figure = Figure(figsize=(8, 7), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    numbers = np.array([found.surrogate.K, found.surrogate.w0])
     colours = colormaps["viridis"](np.linspace(0, 0.9, len(shown)))
     for colour, index in zip(colours, shown, strict=True):
         step = found.steps[index]
-        answer = MODELS["first_order"].response(numbers, step)
+        answer = found.answer(step)
         top.plot(step.time, step.eye_deg, color=colour, lw=1.6)
         top.plot(step.time, answer, color=MODEL, lw=1, ls="--")
         bottom.plot(step.time, step.eye_deg - answer, color=colour, lw=1.2)
@@ -60,7 +60,7 @@ def figure_3_6(found: Identification, shown: Sequence[int] | NDArray[np.intp]) -
             va="center", fontsize=8, color=colour,
         )  # fmt: skip
     top.plot([], [], color="black", lw=1.6, label="plant")
-    top.plot([], [], color=MODEL, ls="--", lw=1, label=f"surrogate, K = {numbers[0]:.4g}, w0 = {numbers[1]:.4g} rad/s")
+    top.plot([], [], color=MODEL, ls="--", lw=1, label=f"surrogate, {_numbers(found)}")
     low, high = top.get_ylim()
     top.set_ylim(low, high + 0.1 * (high - low))
     top.legend(frameon=False, loc="upper left", ncols=2)
@@ -72,13 +72,19 @@ def figure_3_6(found: Identification, shown: Sequence[int] | NDArray[np.intp]) -
     return figure
 
 
+def _numbers(found: Identification) -> str:
+    """The surrogate's numbers with their units."""
+    told = ((p.name, getattr(found.surrogate, p.name), p.unit) for p in found.surrogate_model.parameters)
+    return ", ".join(f"{name} = {value:.4g} {unit.removeprefix('deg/deg')}".rstrip() for name, value, unit in told)
+
+
 def recorded_steps(found: Identification) -> Figure:
     """Recorded responses with their fits, the motor that drives them, and the residuals."""
     rows = len(found.steps)
     figure = Figure(figsize=(13, 2.9 * rows + 0.6), layout="constrained")
     grid = figure.subplots(rows, 3, squeeze=False, width_ratios=(3, 2, 2))
     best = found.preferred.fit.model.name
-    drawn = list(dict.fromkeys(("first_order", best)))
+    drawn = list(dict.fromkeys(("first_order", best, found.surrogate_model.name)))[-2:]
     styles = dict(zip(drawn, ((MODEL, "--"), (OTHER, "-")), strict=False))
     for line, step, fits in zip(grid, found.steps, found.fits, strict=True):
         eye, residual, motor = line

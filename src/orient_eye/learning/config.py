@@ -48,6 +48,8 @@ _PRESETS: dict[str, dict[str, Any]] = {
         "reward_scale": "raw",
     },
 }
+_LIMITED = {"updates": 5_000, "saccades_per_update": 64, "evaluation_pairs": 30}
+"""Of ours, on a rig whose motor's limits are simulated: minutes on two cores (docs/learning.md)."""
 _LARGEST = {
     "updates": 10**9,
     "saccades_per_update": 10**5,
@@ -68,7 +70,7 @@ class TrainConfig:
     """Options of that plant, by name."""
     case: str = "1"
     """Learning case: the pulse of the motor command and its onset rate C (thesis 4.3, 5.1 to 5.3)."""
-    targets: str = "horizontal"
+    targets: Annotated[str | None, _default("horizontal, or what the plant turns")] = None
     """Set of targets between which saccades are made."""
     driven: Annotated[tuple[str, ...] | None, _default("those that the targets need")] = None
     """Motors that the policy commands; the others stay where they are."""
@@ -79,15 +81,23 @@ class TrainConfig:
         tyro.conf.arg(metavar="WEIGHT ...", help_behavior_hint="(default: those of the case on the plant)"),
     ] = None
     """Weights of the reward's terms: accuracy, energy, duration, overshoot (thesis 4.32; see orient-eye weights)."""
+    end_point_error_deg: Annotated[
+        float | None, tyro.conf.arg(name="end-point-error", help_behavior_hint="(default: 0.25 on a rig)")
+    ] = None
+    """End-point error one can live with, deg at 5 deg: sets the weights by rule, on any plant (docs/weights.md)."""
+    robust: bool = False
+    """Perform each saccade on another eye of the 95 % intervals that sysid found, and say what that costs."""
     band: float = BAND
     """Settling band as a share of the amplitude: the saccade lasts until the eye stays within it."""
     horizon_s: Annotated[float | None, _default("the plant's own")] = None
     """How long a simulated saccade lasts, in s."""
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
-    updates: Annotated[int | None, _default("14000; thesis 300000")] = None
+    updates: Annotated[int | None, _default("14000, 5000 on a rig; thesis 300000")] = None
     """How many times the networks are updated."""
-    saccades_per_update: Annotated[int | None, _default("128 in closed form, 32 simulated; thesis 1")] = None
+    saccades_per_update: Annotated[int | None, _default("128 in closed form, 64 on a rig, 32 simulated; thesis 1")] = (
+        None
+    )
     """Fresh saccades performed before each update."""
     batch_size: Annotated[int | None, _default("1024; thesis 8196")] = None
     """Saccades that one update learns from."""
@@ -106,7 +116,7 @@ class TrainConfig:
     """Whether to learn on the logarithm of the reward, which has the same optimal policy, or on the raw reward."""
     device: str = "cpu"
     """Device on which the networks live: cpu, cuda, or cuda:NUMBER."""
-    evaluation_pairs: Annotated[int | None, _default("300 in closed form, 60 simulated")] = None
+    evaluation_pairs: Annotated[int | None, _default("300 in closed form, 30 on a rig, 60 simulated")] = None
     """Random saccades on which the policy is held against the searched optimum."""
     seed: int = 0
     """Seed of everything random in the run."""
@@ -118,18 +128,32 @@ class TrainConfig:
             InputError: an unknown name, or options that do not go together.
         """
         from orient_eye.plants import make_plant  # the physics, which --help does not wait for
+        from orient_eye.task.judge import JUDGES
+        from orient_eye.task.known_weights import solve
         from orient_eye.task.saccade import SaccadeTask
+        from orient_eye.task.targets import make_targets
 
-        return SaccadeTask.of_case(
-            make_plant(self.plant, **self.plant_options),
+        if self.weights is not None and self.end_point_error_deg is not None:
+            raise InputError("weights and end_point_error_deg both set the reward's weights; give one of them")
+        plant = make_plant(self.plant, **self.plant_options)
+        targets = make_targets(self.targets, plant, driven=self.driven)
+        weights = self.weights
+        if self.end_point_error_deg is not None:
+            weights = dict.fromkeys(JUDGES[targets.of].names, 1.0)  # until they are set
+        task = SaccadeTask.of_case(
+            plant,
             self.case,
-            targets=self.targets,
+            targets=targets,
             driven=self.driven,
-            weights=self.weights,
+            weights=weights,
             band=self.band,
             speed_limit=self.speed_limit,
             horizon_s=self.horizon_s,
         )
+        if self.end_point_error_deg is None:
+            return task
+        solved, where = solve(task, self.end_point_error_deg)
+        return replace(task, weights=solved, weights_from=where)
 
     def resolved(self, task: "SaccadeTask | None" = None) -> "TrainSettings":
         """The settings of a run, with nothing left open.
@@ -147,9 +171,10 @@ class TrainConfig:
         values: dict[str, Any] = {
             "saccades_per_update": task.plant.pace.saccades_per_update,
             "evaluation_pairs": task.plant.pace.evaluation_pairs,
-            **_PRESETS[self.preset],
+            **(_PRESETS[self.preset] | (_LIMITED if self.preset == "ours" and _limited(task) else {})),
             **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},
         }
+        values["robust"] = _intervals(task) if self.robust else {}
         return TrainSettings(task=task.identity(), weights_from=task.weights_from, **values)
 
 
@@ -161,6 +186,7 @@ class TrainSettings:
         task: identity of plant, actions, targets and reward (`SaccadeTask.identity`).
         weights_from: where the reward's weights are from, in words.
         case: name of the learning case.
+        robust: low and high of the plant's numbers, drawn anew for each saccade; none for the plant as it is.
 
     The others are those of `TrainConfig`.
 
@@ -183,6 +209,7 @@ class TrainSettings:
     device: str
     evaluation_pairs: int
     seed: int
+    robust: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, largest in _LARGEST.items():
@@ -195,6 +222,8 @@ class TrainSettings:
         if isinstance(temperature, list):  # as JSON has it
             temperature = tuple(temperature)
             object.__setattr__(self, "temperature", temperature)
+        robust = {str(name): (float(ends[0]), float(ends[1])) for name, ends in self.robust.items()}
+        object.__setattr__(self, "robust", robust)
         pair = isinstance(temperature, tuple) and len(temperature) == 2 and all(map(_positive, temperature))
         words = "'auto', or a first and a last one, positive and finite"
         _require(temperature == "auto" or pair, "temperature", words, temperature)
@@ -219,6 +248,18 @@ class TrainSettings:
             return cls(**content)
         except TypeError as error:
             raise InputError(f"these settings are not of this version of orient-eye: {error}") from error
+
+
+def _limited(task: "SaccadeTask") -> bool:
+    """Whether it is a rig, with bounds of its own, that takes a horizon because its motor is simulated."""
+    return task.plant.pulse_rates is not None and task.plant.horizon_s is not None
+
+
+def _intervals(task: "SaccadeTask") -> dict[str, tuple[float, float]]:
+    """Those of the task's plant."""
+    from orient_eye.plants.uncertain import uncertain
+
+    return uncertain(task.plant).intervals
 
 
 def _require(fits: bool, name: str, allowed: str, value: Any) -> None:

@@ -240,24 +240,26 @@ def _differences(trained: dict[str, Any], here: dict[str, Any]) -> list[str]:
     other_plant = before.get("plant") != now["plant"]
     if other_plant:
         words.append(f"plant {plant_in_words(before)}, not {plant_in_words(now)}")
-    one, two = (
-        {**({} if other_plant else plant), **_flat({key: part for key, part in task.items() if key != "plant"})}
-        for task, plant in ((trained, before), (here, now))
-    )
-    for key in dict.fromkeys((*one, *two)):
-        if one.get(key) != two.get(key) and not (other_plant and key in _FOLLOW_THE_PLANT):
-            words.append(f"{_WORDS.get(key, key)} {in_words(one.get(key))}, not {in_words(two.get(key))}")
+    one, two = (_parts(task, skip="plant" if other_plant else "") for task in (trained, here))
+    for part, key in dict.fromkeys((*one, *two)):
+        first, second = one.get((part, key)), two.get((part, key))
+        if first != second and not (other_plant and key in _FOLLOW_THE_PLANT):
+            name = f"motor's {_WORDS[key]}" if (part, key) == ("plant", "speed_limit") else _WORDS.get(key, key)
+            words.append(f"{name} {in_words(first)}, not {in_words(second)}")
             if key == "model":
                 words[-1] += " (the MJCF changed, or MuJoCo's version)"
     return words
 
 
-def _flat(identity: dict[str, Any]) -> dict[str, Any]:
-    """An identity with the parts of its actions and targets beside the others."""
-    flat: dict[str, Any] = {}
-    for key, part in identity.items():
-        flat |= part if key in ("actions", "targets") and isinstance(part, dict) else {key: part}
-    return flat
+def _parts(identity: dict[str, Any], skip: str) -> dict[tuple[str, str], Any]:
+    """The values of an identity by part (plant, actions, targets, or "") and name."""
+    found: dict[tuple[str, str], Any] = {}
+    for part, value in identity.items():
+        if part == skip:
+            continue
+        nested = part in ("plant", "actions", "targets") and isinstance(value, dict)
+        found |= {(part, name): inner for name, inner in value.items()} if nested else {("", part): value}
+    return found
 
 
 def _read(file: Path) -> tuple[tuple[Array, ...], tuple[Array, ...], Array, Array, NDArray[np.bool_], dict[str, Any]]:

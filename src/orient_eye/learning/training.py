@@ -9,6 +9,7 @@ policy.png and recording.rrd.
 
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,9 +28,12 @@ from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluatio
 from orient_eye.learning.loop import CHECKPOINT_S, Stop, StopRequest, TrainingLoop
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
+from orient_eye.learning.robust import DRAWS, over_the_interval, robust_env
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
+from orient_eye.plants.uncertain import uncertain
 from orient_eye.progress import progress_bar
 from orient_eye.run_directory import RunDirectory, versions
+from orient_eye.task.known_weights import bounds, compared_with_thesis
 from orient_eye.task.saccade import SaccadeTask
 
 _NETS = [128, 128, 32]  # thesis 4.6
@@ -48,8 +52,17 @@ class Interrupted(Exception):
         super().__init__(f"stopped; go on with: orient-eye train --resume {folder}")
 
 
+Begun = Callable[[SaccadeTask], object]
+"""Called with the task when a run is about to begin."""
+
+
 def train(
-    config: TrainConfig, out: Path | None = None, *, quiet: bool = False, checkpoint_s: float = CHECKPOINT_S
+    config: TrainConfig,
+    out: Path | None = None,
+    *,
+    quiet: bool = False,
+    checkpoint_s: float = CHECKPOINT_S,
+    begun: Begun | None = None,
 ) -> dict[str, Any]:
     """Run a new training.
 
@@ -58,6 +71,7 @@ def train(
         out: its directory, new or empty; None for runs/train-DATE-TIME.
         quiet: no progress bar.
         checkpoint_s: seconds between checkpoints.
+        begun: called with the task before the work begins.
 
     Returns:
         The content of result.json.
@@ -70,6 +84,8 @@ def train(
     task = config.make_task()  # before the directory: bad input leaves nothing behind
     settings = config.resolved(task)
     run = RunDirectory.create(out, "train", settings, seed=settings.seed)
+    if begun is not None:
+        begun(task)
     return _Run(settings, task, run, checkpoint_s, quiet).execute(resume=False)
 
 
@@ -124,9 +140,7 @@ class _Run:
         streams = np.random.SeedSequence(settings.seed).spawn(4)
         networks, saccades, actions, buffer = (int(stream.generate_state(1)[0]) for stream in streams)
         torch.set_num_threads(1)  # these networks are too small to share
-        env = SaccadeVecEnv(
-            settings.saccades_per_update, self.task, log_reward=settings.reward_scale == "log", infos=False
-        )
+        env = self._env()
         model = self._model(env, seed=networks, buffer_seed=buffer)
         env.seed(saccades)  # SB3 has given both the seed of the networks
         model.action_space.seed(actions)
@@ -147,6 +161,14 @@ class _Run:
 
     def _warmup_steps(self) -> int:
         return -(-self.settings.warmup // self.settings.saccades_per_update)
+
+    def _env(self) -> SaccadeVecEnv:
+        saccades = self.settings.saccades_per_update
+        options: dict[str, Any] = {"infos": False}
+        options["log_reward"] = self.settings.reward_scale == "log"
+        if self.settings.robust:
+            return robust_env(saccades, self.task, self.settings.robust, **options)
+        return SaccadeVecEnv(saccades, self.task, **options)
 
     def _model(self, env: SaccadeVecEnv, *, seed: int, buffer_seed: int) -> OneStepSAC:
         settings = self.settings
@@ -202,7 +224,10 @@ class _Run:
         policy = self.policy(model)
         found = {
             "plant": self.task.plant.name,
+            "weights": dict(self.task.weights),
             "weights_from": self.task.weights_from,
+            "bounds": bounds(self.task),
+            "compared_with_thesis": compared_with_thesis(self.task),
             "updates": self.settings.updates,
             "saccades": model.num_timesteps,
             "train_s": round(loop.elapsed, 1),
@@ -210,6 +235,15 @@ class _Run:
             "failed_saccades": loop.failed,
             "table": amplitude_table(table, policy.act),
         }
+        if self.settings.robust:
+            plant = uncertain(self.task.plant, self.settings.robust)
+            learned = policy.act(yardstick.start.orientation, yardstick.target)
+            found["robust"] = {
+                "intervals": self.settings.robust,
+                "eyes": DRAWS * len(yardstick.target),
+                "policy": over_the_interval(yardstick, plant, learned),
+                "best_of_nominal": over_the_interval(yardstick, plant, yardstick.optimum.action),
+            }
         replace(policy, manifest={**policy.manifest, "result": found}).save(self.run.path)
         draw_learning(self.run.path / "metrics.csv", self.run.path / "learning.png")
         draw_policy(policy, yardstick, self.run.path / "policy.png")

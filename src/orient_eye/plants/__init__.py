@@ -175,6 +175,7 @@ class PlantKind:
 
 
 _EYE = Option("eye", str, "thesis", f"Preset of the eye ({', '.join(EYES)}), or an MJCF file of the same form.")
+_RIG = Option("rig", str, None, "Limits of its motors: a rig's TOML file, or a shipped one (prototype).")
 _GRAVITY = Option("gravity", bool, False, "With the gravity torque.")
 
 PLANTS: Registry[PlantKind] = Registry(
@@ -183,7 +184,10 @@ PLANTS: Registry[PlantKind] = Registry(
         "lpf": PlantKind(
             "the low-pass surrogate",
             "orient_eye.plants.linear:LinearPlant",
-            (Option("surrogate", str, "thesis", "A surrogate.json written by sysid, or the name of a shipped one."),),
+            (
+                Option("surrogate", str, "thesis", "A surrogate.json written by sysid, or the name of a shipped one."),
+                _RIG,
+            ),
             restore="orient_eye.plants.linear:restore",
         ),
         "mujoco": PlantKind(
@@ -193,6 +197,7 @@ PLANTS: Registry[PlantKind] = Registry(
                 _EYE,
                 Option("accurate", bool, False, "Integrate at 0.2 ms instead of the thesis' 1 ms."),
                 _GRAVITY,
+                _RIG,
             ),
         ),
         "tavares": PlantKind(
@@ -202,9 +207,11 @@ PLANTS: Registry[PlantKind] = Registry(
                 _EYE,
                 _GRAVITY,
                 Option("as_published", bool, False, "The author's program to the letter."),
+                _RIG,
             ),
         ),
     },
+    PlantKind,
 )
 """Name to kind of plant."""
 
@@ -223,18 +230,22 @@ def make_plant(name: str, **options: Any) -> Plant:
     return _made(name, load(kind.make) if isinstance(kind.make, str) else kind.make, options)
 
 
-def restore_plant(identity: dict[str, Any]) -> Plant:
+def restore_plant(identity: dict[str, Any], **instead: Any) -> Plant:
     """The plant of an identity, as `Plant.identity` gives it.
 
+    Args:
+        identity: plain values.
+        instead: options of its kind that take the place of the identity's.
+
     Raises:
-        InputError: unknown plant, or an identity its kind knows nothing of.
+        InputError: unknown plant, an identity its kind knows nothing of, or an option it has not.
     """
     name = str(identity.get("plant"))
     kind = PLANTS[name]
     if kind.restore is not None:
         restore = load(kind.restore) if isinstance(kind.restore, str) else kind.restore
-        return _made(name, restore, {"identity": identity})
-    options = {key: value for key, value in identity.items() if key not in ("plant", "model")}
+        return _made(name, restore, {"identity": identity, **instead})
+    options = {key: value for key, value in identity.items() if key not in ("plant", "model")} | instead
     known = [option.name for option in kind.options]
     if set(options) - set(known):  # an identity can be a stranger's: it chooses options, and nothing else of a class
         raise InputError(f"plant {name!r} has the options {', '.join(known) or '(none)'}, got {', '.join(options)}")

@@ -72,9 +72,14 @@ def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int
         InputError: an orientation that these motors cannot hold.
     """
     orientation = np.asarray(orientation, dtype=float)
+    if not np.isfinite(orientation).all():
+        raise InputError("an orientation to hold holds numbers that are not finite")
     motor = np.zeros((len(orientation), motors))
     step = np.rad2deg(_STEP)
+    moving = np.ones(len(orientation), bool)  # each row stops by itself
     for _ in range(_ITERATIONS):
+        if not moving.any():
+            break
         residual = torque(orientation, motor)
         columns = []
         for index in driven:
@@ -85,9 +90,9 @@ def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int
         normal = np.swapaxes(slope, -1, -2)
         square = normal @ slope + 1e-18 * np.eye(len(driven))  # a motor at its limit may pull on nothing
         change = -np.linalg.solve(square, normal @ residual[..., None])[..., 0]
+        change[~moving] = 0
         motor[:, driven] = np.clip(motor[:, driven] + np.clip(change, -20, 20), *limit[driven].T)
-        if np.abs(change).max(initial=0.0) < 1e-10:
-            break
+        moving &= np.abs(change).max(axis=1, initial=0.0) >= 1e-10
     residual = np.abs(torque(orientation, motor)).max(axis=-1, initial=0.0)
     bad = ~(residual < 1e-7)
     # Far from straight ahead the torque also vanishes where the eye would never come to rest.

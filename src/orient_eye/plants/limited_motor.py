@@ -7,6 +7,7 @@ else it goes after the command as fast as its limits let it, braking in time for
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from orient_eye.motor import Motor
 
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-9  # of a limit: rounding is not a violation
-_CAUGHT_UP = 1e-9  # of the motors' unit
+_CAUGHT_UP = 1e-11  # of the motors' unit
 
 
 def follow(
@@ -80,24 +81,34 @@ def _pursue(told: Array, start: Array, speed: Array, acceleration: Array, step_s
     bounded = np.isfinite(acceleration)
     a = np.where(bounded, acceleration, 0.0)
     half, most = 0.5 * a * step_s, np.where(bounded, a * step_s, np.inf)
-    # Behind the last sample at which the command breaks a limit, and once all motors have caught up, nothing is left.
+    # Behind the last sample at which its command breaks a limit, a saccade whose motors have caught up follows it.
     velocities = np.diff(told, axis=1, prepend=told[:, :1]) / step_s
     changes = np.diff(velocities, axis=1, prepend=0.0) / step_s
-    over = (np.abs(velocities) > speed) | (np.abs(changes) > acceleration)
-    last = int(np.flatnonzero(over.any(axis=(0, 2)))[-1])
-    for k in range(told.shape[1] - 1):
-        wanted = (told[:, k + 1] - position) / step_s
+    over: Any = np.abs(velocities) > speed
+    over = (over | (np.abs(changes) > acceleration)).any(axis=2)
+    samples = told.shape[1]
+    last = samples - 1 - over[:, ::-1].argmax(axis=1)
+    last[~over.any(axis=1)] = 0  # but for its start, it keeps them
+    behind = np.arange(len(told))  # saccades whose motors have not caught up
+    for k in range(samples - 1):
+        here, following = told[behind, k], told[behind, k + 1]
+        wanted = (following - position) / step_s
         if bounded.any():
-            gap = told[:, k] - position
+            gap = here - position
             # Braking from w by a each step stops within the gap: w (w / a + h) / 2 = gap.
             brake = np.sqrt(half**2 + 2 * a * np.abs(gap)) - half
-            pace = np.clip((told[:, k + 1] - told[:, k]) / step_s, -speed, speed)
+            pace = np.clip((following - here) / step_s, -speed, speed)
             braked = pace + np.clip(gap / step_s, -brake, brake)
             wanted = np.where(bounded, np.clip(braked, velocity - most, velocity + most), wanted)
         velocity = np.clip(wanted, -speed, speed)
         position = position + step_s * velocity
-        taken[:, k + 1] = position
-        if k > last and np.abs(position - told[:, k + 1]).max() < _CAUGHT_UP:
-            taken[:, k + 2 :] = told[:, k + 2 :]
+        taken[behind, k + 1] = position
+        near = (k + 1 >= last[behind]) & (np.abs(position - following).max(axis=1) < _CAUGHT_UP)
+        if near.any():
+            following_pace = velocities[behind, min(k + 2, samples - 1)]
+            caught = near & (np.abs(following_pace - velocity) <= most * (1 + _TOLERANCE)).all(axis=1)
+            taken[behind[caught], k + 1 :] = told[behind[caught], k + 1 :]
+            behind, position, velocity = behind[~caught], position[~caught], velocity[~caught]
+        if not len(behind):
             break
     return taken

@@ -19,9 +19,10 @@ from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND, HORIZON_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.movement import Movement, energy_of
-from orient_eye.movement.measures import Measures, View, measure_angle, merged
+from orient_eye.movement.measures import Measures, View, measure, measure_angle, merged
 from orient_eye.movement.trajectory import Trajectory, concatenate
 from orient_eye.plants import CLOSED_FORM, PulseRates
+from orient_eye.plants.limits import are_limited, limited_surrogate, travel_s
 from orient_eye.plants.linear_response import (
     LinearResponse,
     free_response,
@@ -30,6 +31,7 @@ from orient_eye.plants.linear_response import (
     second_order_poles,
 )
 from orient_eye.plants.simulated import Given, Run, SimulatedPlant
+from orient_eye.rig import Rig
 from orient_eye.state import State
 from orient_eye.surrogate import Surrogate, shipped_surrogates
 
@@ -47,14 +49,26 @@ class LinearPlant(SimulatedPlant):
 
     Args:
         surrogate: its numbers, a file of them, or the name of a shipped one.
+        rig: whose drive of the surrogate's axis limits the motor: a TOML file or a shipped rig; None for the one
+            inside the surrogate, if there is one.
         step_s: interval between samples [s].
+
+    Raises:
+        InputError: no such surrogate or rig, or a rig that does not turn the surrogate's axis.
     """
 
     name = "lpf"
     pace = CLOSED_FORM
 
-    def __init__(self, surrogate: Surrogate | str | Path = "thesis", *, step_s: float = STEP_S) -> None:
+    def __init__(
+        self,
+        surrogate: Surrogate | str | Path = "thesis",
+        *,
+        rig: Rig | str | Path | None = None,
+        step_s: float = STEP_S,
+    ) -> None:
         numbers = surrogate if isinstance(surrogate, Surrogate) else Surrogate.load(surrogate)
+        numbers = limited_surrogate(numbers, rig)
         self.surrogate, self.step_s = numbers, step_s
         bounds = numbers.range or (-_WORKING_DEG, _WORKING_DEG)
         motor = numbers.as_motor((max(bounds[0], -_WORKING_DEG), min(bounds[1], _WORKING_DEG)))
@@ -66,7 +80,7 @@ class LinearPlant(SimulatedPlant):
             assert numbers.wn is not None
             assert numbers.zeta is not None
             self.poles = tuple(p.item() for p in second_order_poles(numbers.wn, numbers.zeta))
-        limited = motor.speed_limit is not None or motor.acceleration_limit is not None
+        limited = are_limited(self.motors)
         first_order = numbers.w0 is not None and not numbers.dead_time
         self.slow_pole = numbers.w0 if first_order and not limited else None
         self.horizon_s = self._horizon() if limited or numbers.range is not None else None
@@ -75,11 +89,7 @@ class LinearPlant(SimulatedPlant):
 
     def _horizon(self) -> float:
         """Long enough for the largest saccade of a motor that takes its time [s]."""
-        motor = self.motors[0]
-        span = motor.working[1] - motor.working[0]
-        travel = span / motor.speed_limit if motor.speed_limit else 0.0
-        if motor.acceleration_limit:
-            travel += 2 * np.sqrt(span / motor.acceleration_limit)
+        travel = travel_s(self.motors)
         slowest = min(complex(pole).real for pole in self.poles)
         return max(HORIZON_S, float(np.ceil(10 * (self.surrogate.dead_time + travel + _SETTLED / slowest)) / 10))
 
@@ -115,14 +125,14 @@ class LinearPlant(SimulatedPlant):
         Raises:
             InputError: also for a start that is turned about another axis.
         """
-        one = isinstance(command, PulseStep) and command.F.shape[1] == 1
-        if not (one and (start is None or self._rests(start, command.F))):
+        if not isinstance(command, PulseStep) or command.F.shape[1] != 1 or not len(command):
             return self._sampled(self.prepare(as_command(command, self.step_s), start, horizon_s))
         closed = ClosedMovement(self, command, self.samples(command, horizon_s))
-        if self.horizon_s is None:
+        rests = self._rests(start, command.F)
+        if self.horizon_s is None and rests.all():
             return closed
         given = self.prepare(command, start, horizon_s)
-        changed = given.saturated | given.limited | given.failed
+        changed = given.saturated | given.limited | given.failed | ~rests
         if not changed.any():
             return closed
         if changed.all():
@@ -135,6 +145,7 @@ class LinearPlant(SimulatedPlant):
         s = self.surrogate
         angle, rate = sampled_response(s.K, self.poles, s.dead_time, motor, self.step_s)
         off = self._angle(given.start.orientation) - s.K * motor[:, 0]
+        off = np.where(np.abs(off) < _SAME_DEG, 0.0, off)
         spin = given.start.angular_velocity[:, rotations.AXES[s.axis]]
         if np.abs(off).max(initial=0) > 0 or np.abs(spin).max(initial=0) > 0:
             free = free_response(self.poles, off, spin, self.times(motor.shape[1]))
@@ -161,17 +172,12 @@ class LinearPlant(SimulatedPlant):
         """See `orient_eye.plants.Plant`."""
         return self._angle(np.asarray(orientation, float))[:, None] / self.surrogate.K
 
-    def _rests(self, start: State, motor: Array) -> bool:
-        """Whether all eyes rest where these motor positions hold them."""
-        if start.motor.shape != motor.shape:
-            return False
-        held = rotations.angle_between(self.rest(motor), start.orientation)
-        off = max(
-            held.max(initial=0),
-            np.abs(start.motor - motor).max(initial=0),
-            np.abs(start.angular_velocity).max(initial=0),
-        )
-        return bool(off < _SAME_DEG)
+    def _rests(self, start: State | None, motor: Array) -> NDArray[np.bool_]:
+        """Which eyes rest where these motor positions hold them, (saccades,); a start of another shape does not."""
+        if start is None or start.motor.shape != motor.shape:
+            return np.full(len(motor), start is None)
+        off = [rotations.angle_between(self.rest(motor), start.orientation)[:, None], start.motor - motor]
+        return np.asarray((np.abs(np.concatenate([*off, start.angular_velocity], axis=1)) < _SAME_DEG).all(axis=1))
 
     def _angle(self, orientation: Array) -> Array:
         """About the axis [deg], (saccades,)."""
@@ -186,11 +192,19 @@ class LinearPlant(SimulatedPlant):
         return angle
 
 
-def restore(identity: dict[str, Any]) -> LinearPlant:
-    """The plant of an identity; with the numbers of a shipped surrogate it is that one, with the eye it stands for."""
-    plants = (LinearPlant(name) for name in shipped_surrogates())
+def restore(identity: dict[str, Any], rig: Rig | str | Path | None = None) -> LinearPlant:
+    """The plant of an identity; with the numbers of a shipped surrogate it stands for the same eye.
+
+    Args:
+        identity: see `LinearPlant.identity`.
+        rig: whose limits take the place of the identity's.
+    """
     numbers = {key: value for key, value in identity.items() if key != "plant"}
-    return next((plant for plant in plants if plant.identity() == identity), None) or LinearPlant(Surrogate(**numbers))
+    limits = {key: numbers.get(key) for key in ("range", "speed_limit", "acceleration_limit")}
+    unlimited = {key: value for key, value in identity.items() if key not in limits}
+    shipped = (LinearPlant(name) for name in shipped_surrogates())
+    eye = next((plant.surrogate.eye for plant in shipped if plant.identity() == unlimited), None)
+    return LinearPlant(Surrogate(**numbers, eye=eye), rig=rig)
 
 
 @dataclass(frozen=True)
@@ -228,6 +242,8 @@ class ClosedMovement:
 
     def measure(self, band: float = BAND, of: View = "orientation") -> Measures:
         """See `orient_eye.movement.Movement`; of an eye that turns about one axis."""
+        if of == "gaze" and self.plant.surrogate.axis == "roll":  # which does not move it
+            return measure(self.trajectory(), self.plant.rest(self.command.D), band=band, of=of)
         return measure_closed_form(self.response, band, self.plant.surrogate.axis)
 
     def trajectory(self) -> Trajectory:
@@ -281,6 +297,9 @@ class PathMovement:
     def measure(self, band: float = BAND, of: View = "orientation") -> Measures:
         """See `orient_eye.movement.Movement`; of an eye that turns about one axis."""
         low, high = self.plant.motors[0].range
+        if of == "gaze" and self.plant.surrogate.axis == "roll":
+            rest = self.plant.rest(np.clip(self.given.command.final, low, high))
+            return measure(self.trajectory(), rest, band=band, of=of)
         final = self.plant.surrogate.K * np.clip(self.given.command.final[:, 0], low, high)
         failed = self.given.failed | ~np.isfinite(final)
         time = self.plant.times(self.angle.shape[1])

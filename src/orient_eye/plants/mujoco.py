@@ -14,6 +14,7 @@ import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -25,7 +26,9 @@ from orient_eye.errors import InputError
 from orient_eye.eyes.model import tendon_tension
 from orient_eye.motor import names
 from orient_eye.plants.elastic import ElasticPlant
+from orient_eye.plants.limits import Limits
 from orient_eye.plants.simulated import Run
+from orient_eye.rig import Rig
 from orient_eye.rotations import rotation
 from orient_eye.state import State
 
@@ -41,21 +44,30 @@ class MujocoPlant(ElasticPlant):
         eye: preset, one of `orient_eye.eyes.EYES`, or an MJCF file of the same form.
         accurate: integrate at 0.2 ms, friction implicit, instead of the thesis' explicit 1 ms.
         gravity: add the gravity torque (thesis 3.8), off in the thesis' runs.
+        rig: whose motors limit those of the same names: a TOML file, a shipped rig, or the limits by motor.
         threads: of the batch; 0 for one a core.
 
     Raises:
-        InputError: unknown eye, or a number of threads that is none.
+        InputError: unknown eye or rig, or a number of threads that is none.
     """
 
     name = "mujoco"
 
-    def __init__(self, eye: str = "thesis", *, accurate: bool = False, gravity: bool = False, threads: int = 0) -> None:
-        if not isinstance(threads, int) or threads < 0:
+    def __init__(
+        self,
+        eye: str = "thesis",
+        *,
+        accurate: bool = False,
+        gravity: bool = False,
+        rig: Rig | Limits | str | Path | None = None,
+        threads: int = 0,
+    ) -> None:
+        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 0:
             raise InputError(f"threads are a whole number, 0 for one a core, got {threads!r}")
         self.threads = threads
         self.substeps = _ACCURATE_SUBSTEPS if accurate else 1
         options = {"eye": eye, "accurate": accurate, "gravity": gravity}
-        super().__init__(options, step_s=self.step_s / self.substeps, gravity=gravity)
+        super().__init__(options, step_s=self.step_s / self.substeps, gravity=gravity, rig=rig)
         if accurate:
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         eye_joint = self.model.joint("eye")
@@ -71,6 +83,7 @@ class MujocoPlant(ElasticPlant):
         lengths = [self._sensed(f"length_{name}") for name in self.tendons]
         self._sensed_length = np.array([place.start for place in lengths])
         self._pool = _Pool(self.model, threads)
+        self._fit_to_limits()
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.options, "threads": self.threads}

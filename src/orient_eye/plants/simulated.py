@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.commands import Command, as_command
-from orient_eye.constants import HORIZON_S, STEP_S
+from orient_eye.constants import HORIZON_S, LONGEST_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.motor import Motor, names, ranges
 from orient_eye.movement import Movement, SampledMovement
@@ -124,7 +124,13 @@ class SimulatedPlant(ABC):
         return np.arange(samples) * np.float64(self.step_s)
 
     def samples(self, command: Command, horizon_s: float | None) -> int:
-        """How many samples a movement has."""
+        """How many samples a movement has.
+
+        Raises:
+            InputError: a horizon that is none.
+        """
+        if horizon_s is not None and not 0 < horizon_s <= LONGEST_S:
+            raise InputError(f"a horizon lies between 0 and {LONGEST_S:g} s, got {horizon_s}")
         told = (horizon_s, command.duration_s, self.horizon_s, HORIZON_S)
         duration = next(seconds for seconds in told if seconds is not None)
         return round(duration / self.step_s) + 1

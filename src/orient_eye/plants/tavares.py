@@ -6,6 +6,8 @@ a rigid body with viscous friction in four small ways, which the option `as_publ
 them its runs come out to 0.0004 deg (`orient-eye validate`).
 """
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -13,7 +15,9 @@ from scipy.spatial.transform import Rotation
 from orient_eye.eyes.elastics import Elastics
 from orient_eye.eyes.model import STANDARD_GRAVITY
 from orient_eye.plants.elastic import ElasticPlant
+from orient_eye.plants.limits import Limits
 from orient_eye.plants.simulated import Run
+from orient_eye.rig import Rig
 from orient_eye.rotations import FORWARD, rotation
 from orient_eye.state import State
 
@@ -35,13 +39,22 @@ class TavaresPlant(ElasticPlant):
             it should be R I R^T), there is no gyroscopic torque, a step adds a straight piece to the
             quaternion and normalises it, and the eye stands still while slower than 1e-5 rad/s under
             less than 0.006 N m. Without it: a full rigid body, viscous friction only, exact rotations.
+        rig: whose motors limit those of the same names: a TOML file, a shipped rig, or the limits by motor.
     """
 
     name = "tavares"
 
-    def __init__(self, eye: str = "thesis", *, gravity: bool = False, as_published: bool = False) -> None:
-        super().__init__({"eye": eye, "gravity": gravity, "as_published": as_published}, step_s=self.step_s)
+    def __init__(
+        self,
+        eye: str = "thesis",
+        *,
+        gravity: bool = False,
+        as_published: bool = False,
+        rig: Rig | Limits | str | Path | None = None,
+    ) -> None:
+        super().__init__({"eye": eye, "gravity": gravity, "as_published": as_published}, step_s=self.step_s, rig=rig)
         self.elastics = Elastics.from_model(self.model)
+        self._fit_to_limits()
 
     def elastic_torque(self, turn: Array, motor: Array) -> tuple[Array, Array]:
         """Torque of the elastics [N m] (n, 3) and their tension [N] (n, tendons); 3.2 to 3.5.

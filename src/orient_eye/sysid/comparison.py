@@ -108,10 +108,16 @@ def _predictions(fit: Fit, steps: Sequence[StepResponse], held_out: Sequence[Ste
 def preferred(rows: Sequence[Compared]) -> Compared:
     """The model to use: the smallest held-out error, and where nothing was held out the smallest AICc.
 
-    Among models within 2 % of the smallest error, the simplest.
+    Among models within 2 % of the smallest error, the simplest. One whose dead time may as well be 0, by its interval,
+    gives way to the same model without.
     """
     if all(row.held_out for row in rows):
         least = min(row.held_out_rms_deg for row in rows)
         floor = _PERFECT * max(row.fit.rms_deg for row in rows) + 1e-9
-        return next(row for row in rows if row.held_out_rms_deg <= 1.02 * least + floor)
-    return min(rows, key=lambda row: row.aicc)
+        best = next(row for row in rows if row.held_out_rms_deg <= 1.02 * least + floor)
+    else:
+        best = min(rows, key=lambda row: row.aicc)
+    if best.fit.shows_dead_time:
+        return best
+    simpler = best.fit.model.name.removesuffix("_dead_time")
+    return next(row for row in rows if row.fit.model.name == simpler)

@@ -93,6 +93,26 @@ class Fit:
         """Of the parameters, (parameters,)."""
         return np.array([e.value for e in self.estimates])
 
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Why the data do not tell these parameters, for people; empty where they do."""
+        found = []
+        for e in self.estimates:
+            told = f"{e.parameter.name} = {e} {e.parameter.unit}".rstrip()
+            if e.at_bound and not _none_seen(e):
+                found.append(f"{told} sits on its bound ({e.parameter.low:g} to {e.parameter.high:g})")
+            elif not e.half_width < abs(e.value) and not _none_seen(e):
+                found.append(f"{told} has an interval as wide as itself")
+        if self.condition > _ILL_CONDITIONED:
+            found.append(f"parameters cannot be told apart: condition number {self.condition:.1e} (1 is best)")
+        return tuple(found)
+
+    @property
+    def shows_dead_time(self) -> bool:
+        """Whether it has a dead time, whose interval does not reach 0."""
+        last = self.estimates[-1]
+        return last.parameter.name == "dead_time" and last.interval[0] > 0 and not last.at_bound
+
     def response(self, step: StepResponse) -> Array:
         """The fitted model's answer to the motor movement of a step [deg], (samples,)."""
         return self.model.response(self.values, step)
@@ -218,11 +238,16 @@ def _at_bound(parameter: Parameter, value: float) -> bool:
     return min(value - parameter.low, parameter.high - value) < min(near, 0.01 * abs(value) + 1e-6)
 
 
+def _none_seen(estimate: Estimate) -> bool:
+    """Whether it is a dead time of 0, which is what an eye without one has."""
+    return estimate.parameter.name == "dead_time" and estimate.at_bound and estimate.value < estimate.parameter.high / 2
+
+
 def _warnings(model: Model, estimates: tuple[Estimate, ...], condition: float) -> list[str]:
     found, untold = [], []
     for e in estimates:
         p = e.parameter
-        if e.at_bound and p.name == "dead_time" and e.value < p.high / 2:
+        if _none_seen(e):
             found.append("dead_time sits on its bound 0: these data show none")
         elif e.at_bound:
             found.append(f"{p.name} = {e.value:.4g} sits on its bound ({p.low:g} to {p.high:g}): do not trust it")

@@ -15,6 +15,7 @@ and least squares over both motors gives dt and T together. The eye agrees: with
 model leaves a fraction of the residual that it leaves with row-by-row times (docs/sysid.md has numbers).
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,10 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from orient_eye.errors import InputError
+from orient_eye.rig import Rig
 from orient_eye.rotations import rotation, to_euler
-from orient_eye.sysid.step_response import StepResponse, axis_angle
+from orient_eye.sysid.step_response import AXES, StepResponse, axis_angle
+from orient_eye.tables import Table
 
 Array = NDArray[np.float64]
 COLUMNS = (
@@ -39,6 +42,7 @@ POSITION_UNIT_DEG = 90 / 1024
 CENTRE = 512
 VELOCITY_UNIT_DEG_S = 0.111 * 6  # 0.111 rpm
 NOMINAL_INTERVAL_S = 0.010
+_FORMAT = "log of the ORIENT prototype"
 _NEGATIVE = 1024  # added to a negative velocity
 _SLOW_DEG_S = 3.0  # a motor that stands flickers by one count
 _PLAUSIBLE_S = (0.002, 0.1)
@@ -92,13 +96,53 @@ def step_response(name: str, table: Array, axis: str | None = None, row_times: s
     warnings += _missed_eye_samples(eye, drive) + _retouched(table)
     source: dict[str, Any] = {
         "file": name,
-        "format": "log of the ORIENT prototype",
+        "format": _FORMAT,
         "motor": "motor1 - motor3",
         "eye": f"{axis} of the quaternion" if axis else "rotation about the axis of the movement, up positive",
         "rows": len(table),
         **found,
     }
-    return StepResponse(name, time, drive, eye, quaternion, _model_motors(table), source, tuple(warnings))
+    return StepResponse(
+        name=name,
+        time=time,
+        motor_deg=drive,
+        eye_deg=eye,
+        orientation=quaternion,
+        motors=_model_motors(table),
+        drive="motor1 - motor3",
+        axis=axis or "pitch",
+        about=np.array(found["axis_of_movement"]) if axis is None else None,
+        turned={each: float(np.ptp(axis_angle(quaternion, each))) for each in AXES} if axis else {},
+        source=source,
+        warnings=tuple(warnings),
+    )
+
+
+def in_the_rigs_sense(step: StepResponse, table: Table, rig: Rig, axis: str | None) -> StepResponse:
+    """The same log driven by a rig's drive of an axis, None for pitch; the eye turns in the sense of that axis.
+
+    Raises:
+        InputError: the rig does not turn this axis, or has not the motors of the log.
+    """
+    about = axis or "pitch"
+    rig.shares(about)
+    counts = {f"motor{i}_counts": table[f"position{i}"] for i in (1, 2, 3)}
+    drive = rig.from_driver(about, counts)
+    way = -1.0 if axis is None else 1.0  # up, as the log is read, is where pitch is negative
+    return replace(
+        step,
+        motor_deg=drive - drive[0],
+        eye_deg=way * step.eye_deg,
+        motors={m.name: m.from_driver(counts[m.column]) for m in rig.motors if m.column in counts},
+        drive=rig.drive_name(about),
+        about=None if step.about is None else way * step.about,
+        source={**step.source, "motor": rig.drive_name(about)},
+    )
+
+
+def is_log(step: StepResponse) -> bool:
+    """Whether a step response was read from such a log."""
+    return step.source.get("format") == _FORMAT
 
 
 def _model_motors(table: Array) -> dict[str, Array]:

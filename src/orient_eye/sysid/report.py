@@ -22,8 +22,10 @@ from orient_eye.files import write_text
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import make_plant
 from orient_eye.recording import record
+from orient_eye.rig import to_toml
 from orient_eye.state import State
 from orient_eye.sysid.comparison import Compared, HeldOut
+from orient_eye.sysid.first_rig import first_rig
 from orient_eye.sysid.fit import Fit
 from orient_eye.sysid.identification import Identification
 from orient_eye.sysid.models import MODELS
@@ -32,39 +34,50 @@ from orient_eye.sysid.replay import replay
 _SHOWN_STEPS = 9  # of a plant, in the recording and in Figure 3.6
 
 
-def write_report(found: Identification, folder: Path) -> dict[str, Any]:
+def write_report(found: Identification, folder: Path, force: bool = False) -> dict[str, Any]:
     """Write all files of an identification into a folder.
 
-    surrogate.json; fits.json and fits.csv, every fit with its parameters and intervals;
-    figure_3_5.png and figure_3_6.png for a plant, recordings.png for recordings; recording.rrd, where
-    there is an orientation to show.
+    surrogate.json, unless the data do not tell its numbers and it is not forced; fits.json and fits.csv, every fit
+    with its parameters and intervals; figure_3_5.png and figure_3_6.png for a plant, recordings.png for recordings;
+    recording.rrd; and for recordings rig.toml, the rig or a first description of it.
 
     Returns:
         The result as plain values, with the names of the files.
     """
     result = summary(found)
-    told = ("K_interval", "w0_interval", "steps", "models", "held_out", "warnings")
+    told = ("steps", "models", "held_out", "warnings")
     details = {**found.surrogate.details, **{key: result[key] for key in told}}
     details["data"] = [s.source for s in found.steps if s.source]
-    replace(found.surrogate, details=details).save(folder / "surrogate.json")
+    files = []
+    if force or not found.undetermined:
+        replace(found.surrogate, details=details).save(folder / "surrogate.json")
+        files.append("surrogate.json")
+    if found.plant is None:
+        rig = first_rig(found.steps, found.surrogate.axis) if found.rig is None else to_toml(found.rig)
+        write_text(folder / "rig.toml", rig)
+        files.append("rig.toml")
     entries = list(_entries(found))
     write_text(folder / "fits.json", json.dumps(entries, indent=2) + "\n")
     write_text(folder / "fits.csv", _csv(entries))
-    files = ["surrogate.json", "fits.json", "fits.csv", *_pictures(found, folder), *_recording(found, folder)]
+    files += ["fits.json", "fits.csv", *_pictures(found, folder), *_recording(found, folder)]
     return {**result, "files": files}
 
 
 def summary(found: Identification) -> dict[str, Any]:
     """The result as plain values, for `--json`, without NaN or infinity."""
     number = found.surrogate
-    assert number.w0 is not None  # of first order, whatever model is preferred
     by_model = {row.fit.model.name: row for row in found.compared}
     least = min(row.aicc for row in found.compared)
+    numbers: dict[str, Any] = {}
+    for name in found.surrogate_model.names:
+        numbers |= {name: getattr(number, name), f"{name}_interval": list(number.intervals.get(name, (None, None)))}
     return {
-        "K": number.K,
-        "K_interval": _interval(number.K, found.K_half_width),
-        "w0": number.w0,
-        "w0_interval": _interval(number.w0, found.w0_half_width),
+        "model": found.surrogate_model.name,
+        **numbers,
+        "axis": number.axis,
+        "motor": number.motor,
+        "amplitudes_deg": None if number.amplitudes is None else list(number.amplitudes),
+        "undetermined": list(found.undetermined),
         "source": number.source,
         "steps": [_step(found, i) for i in range(len(found.steps))],
         "models": {name: _model(row, least) for name, row in by_model.items()},
@@ -160,7 +173,8 @@ def _pictures(found: Identification, folder: Path) -> list[str]:
 
 
 def _recording(found: Identification, folder: Path) -> list[str]:
-    reference = model = None
+    model, steps = None, list(found.steps)
+    reference: Trajectory | None
     if found.trajectory is not None and found.plant is not None:
         model = found.plant.drawn()
         shown = _shown(len(found.steps))
@@ -169,11 +183,11 @@ def _recording(found: Identification, folder: Path) -> list[str]:
         notes = "Step responses of the plant"
         notes += "" if reference is None else ", in grey the surrogate's"
     else:
-        steps = [s for s in found.steps if s.orientation is not None]
-        if not steps:
-            return []
-        trajectory = replay(steps)
-        notes = "Recorded step responses; the ball stands for the eye of the rig"
+        trajectory, reference = replay(steps), replay(steps, found.answer)
+        notes = (
+            f"Recorded step responses, in grey the fitted {found.surrogate_model.title}; the ball stands for the eye "
+            "of the rig"
+        )
     titles = [s.name for s in steps]
     record(folder / "recording.rrd", trajectory, model=model, titles=titles, reference=reference, notes=notes)
     return ["recording.rrd"]

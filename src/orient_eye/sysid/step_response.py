@@ -31,6 +31,11 @@ class StepResponse:
         eye_deg: position of the eye from its rest position [deg], (samples,).
         orientation: unit quaternion w, x, y, z where the source has one, (samples, 4).
         motors: positions of named motors of the eye where the source has them [deg], each (samples,).
+        drive: name of the motor, or of the sum of several, that `motor_deg` is.
+        axis: about which `eye_deg` turns: yaw, pitch or roll; None where nobody said.
+        about: that axis as a unit vector in the head frame where it is none of these three, (3,).
+        rest: motor and eye at rest as they were read [deg], before they were measured from there.
+        turned: how far the eye turned in yaw, pitch and roll [deg], as far as the source tells.
         source: where it comes from, plain values.
         warnings: what the reader noticed.
     """
@@ -41,6 +46,11 @@ class StepResponse:
     eye_deg: Array
     orientation: Array | None = None
     motors: dict[str, Array] = field(default_factory=dict)
+    drive: str = "motor"
+    axis: str | None = None
+    about: Array | None = None
+    rest: tuple[float, float] = (0.0, 0.0)
+    turned: dict[str, float] = field(default_factory=dict)
     source: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
@@ -64,6 +74,16 @@ class StepResponse:
             orientation=None if self.orientation is None else self.orientation[kept],
             motors={name: values[kept] for name, values in self.motors.items()},
         )
+
+    @property
+    def largest_deg(self) -> float:
+        """Farthest that the motor goes from rest [deg], whether or not it comes back."""
+        return float(np.abs(self.motor_deg).max())
+
+    @property
+    def axis_vector(self) -> Array:
+        """The axis of `eye_deg`, a unit vector in the head frame, (3,)."""
+        return np.eye(3)[rotations.AXES[self.axis or "yaw"]] if self.about is None else self.about
 
     @property
     def amplitude_deg(self) -> float:

@@ -46,7 +46,6 @@ class Number:
         low: least value.
         high: largest value.
         log: spread evenly on a logarithmic scale.
-        difference: half-width of a central difference, in its unit (thesis 4.4.5).
         fine: share of the range around a good value in which a search looks closer.
         cliff: whether the reward may have a cliff along it, so that a search stays on all sides.
     """
@@ -57,7 +56,6 @@ class Number:
     low: float
     high: float
     log: bool = False
-    difference: float = 0.05
     fine: float = 0.03
     cliff: bool = False
 
@@ -157,7 +155,7 @@ class PulseStepActions(ActionSpace):
         speed_limit: float = SPEED_LIMIT,
     ) -> None:
         self.plant, self.driven, self.pulse, self.speed_limit = plant, tuple(driven), pulse, speed_limit
-        self.index = check_driven(plant.motors, driven, plant.name)
+        self.index = check_driven(plant.motors, self.driven, plant.name)
         onset = PULSES[pulse].onset
         if isinstance(C, str) and C != "varying":
             raise InputError(f"C is a number [1/s], 'varying' or nothing, got {C!r}")
@@ -174,9 +172,9 @@ class PulseStepActions(ActionSpace):
             number
             for motor in (plant.motors[i] for i in self.index)
             for number in (
-                Number("B", "1/s", motor.name, *rates.B, log=log, difference=0.2, fine=0.05),
-                Number("D", motor.unit, motor.name, *_finite(motor.working), difference=0.02, fine=0.002),
-                Number("k0", "1/s", motor.name, *rates.k0, log=log, difference=0.05, fine=0.03, cliff=True),
+                Number("B", "1/s", motor.name, *rates.B, log=log, fine=0.05),
+                Number("D", motor.unit, motor.name, *_finite(motor.working), fine=0.002),
+                Number("k0", "1/s", motor.name, *rates.k0, log=log, fine=0.03, cliff=True),
             )
         )
 

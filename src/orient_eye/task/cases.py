@@ -34,5 +34,6 @@ CASES: Registry[Case] = Registry(
         "3-fixed": Case("3", None, "thesis 5.3.1"),
         "3-varying": Case("3", "varying", "thesis 5.3.2"),
     },
+    Case,
 )
 """Name to case."""

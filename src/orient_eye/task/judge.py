@@ -78,11 +78,17 @@ class Judge:
         Raises:
             InputError: other names or another number of them, or weights that are negative, not finite or all 0.
         """
-        if not isinstance(values, Mapping):
-            values = dict(zip(self.names, values, strict=True)) if len(values) == len(self.terms) else {"?": np.nan}
-        if set(values) != set(self.names):
-            raise InputError(f"the reward has {len(self.terms)} weights, {', '.join(self.names)}; got {values}")
-        weights = {name: float(values[name]) for name in self.names}
+        told = f"the reward has {len(self.terms)} weights, {', '.join(self.names)}; got {values!r}"
+        each: Any = values
+        try:
+            if isinstance(each, str):
+                raise TypeError("words")
+            given = dict(each) if isinstance(each, Mapping) else dict(zip(self.names, each, strict=True))
+            weights = {name: float(given[name]) for name in self.names}
+        except (TypeError, ValueError, KeyError) as error:
+            raise InputError(told) from error
+        if set(given) != set(self.names):
+            raise InputError(told)
         if not all(np.isfinite(v) and v >= 0 for v in weights.values()) or not any(weights.values()):
             raise InputError(f"weights must be finite, not negative and not all 0, got {weights}")
         return weights
@@ -138,6 +144,7 @@ JUDGES: Registry[Judge] = Registry(
         "orientation": Judge("orientation", (Term("accuracy", _accuracy, -1.0), *_COMMON)),
         "gaze": Judge("gaze", (Term("accuracy", _gaze_accuracy, -1.0), *_COMMON)),
     },
+    Judge,
 )
 """Name to judge."""
 

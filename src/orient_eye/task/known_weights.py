@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from orient_eye.task.saccade import Outcome, SaccadeTask
 
 Array = NDArray[np.float64]
-_RULE = "3"  # changes when what is below does
+_RULE = "4"  # changes when what is below does
 OVERSHOOT = 0.01
 """Overshoot that the reference saccade may have."""
 DURATION_SHARE = 2.9
@@ -47,6 +47,9 @@ WORTH = 2.0
 """What standing still costs by `by_rule`, in units of what a saccade of 5 deg costs."""
 ERROR_DEG, ERROR_AT_DEG = 0.25, 5.0
 """End-point error with which one can live, and the size of the saccade."""
+ERROR_SHARE = 0.05
+"""What that error costs by `by_rule` at least, in units of what that saccade costs: a policy is a few percent from the
+best, and may not spend them on the end point."""
 _GRID, _ROUNDS = 24, 4  # of the search of the fastest saccade
 
 
@@ -138,10 +141,15 @@ def by_rule(task: SaccadeTask, error_deg: float = ERROR_DEG) -> tuple[dict[str, 
     - A saccade of 5 deg, and the reference, end `error_deg` short where energy saved and accuracy lost balance: energy
       E grows with the square of the amplitude a, so its slope is 2 E / a, and that of lambda_a sin^2(d / 2) is
       lambda_a d / 2 [rad].
+    - To end `error_deg` off costs `ERROR_SHARE` of a saccade of 5 deg.
     - A saccade of 5 deg is worth its cost `WORTH` times over: else the best is not to move.
 
+    Args:
+        task: its weights do not matter.
+        error_deg: end-point error with which one can live [deg], at 5 deg.
+
     Raises:
-        InputError: a reward with other terms than the thesis', or no saccade that settles.
+        InputError: an error that is none, a reward with other terms than the thesis', or no saccade that settles.
     """
     if not 0 < error_deg < 90:
         raise InputError(f"the end-point error that one can live with is positive, got {error_deg} deg")
@@ -153,14 +161,43 @@ def by_rule(task: SaccadeTask, error_deg: float = ERROR_DEG) -> tuple[dict[str, 
     moved = [float(np.deg2rad(o.measures.amplitude_deg[0])) for o in (small, large)]
     duration = DURATION_SHARE * terms[1]["energy"] / terms[1]["duration"]
     balance = max(4 * t["energy"] / (a * np.deg2rad(error_deg)) for t, a in zip(terms, moved, strict=True))
-    worth = WORTH * (terms[0]["energy"] + duration * terms[0]["duration"]) / np.sin(moved[0] / 2) ** 2
+    cost = terms[0]["energy"] + duration * terms[0]["duration"]
+    felt = ERROR_SHARE * cost / np.sin(np.deg2rad(error_deg) / 2) ** 2
+    worth = WORTH * cost / np.sin(moved[0] / 2) ** 2
     weights = {
-        "accuracy": float(max(balance, worth)),
+        "accuracy": float(max(balance, felt, worth)),
         "energy": 1.0,
         "duration": duration,
         "overshoot": OVERSHOOT_SHARE * (1 + DURATION_SHARE) * terms[1]["energy"] / 0.01,
     }
     return weights, f"by rule (docs/weights.md) at the fastest saccade, {_told(task, saccade.action)}"
+
+
+def bounds(task: SaccadeTask) -> dict[str, tuple[float, float]]:
+    """Low and high of the action's numbers, by name."""
+    actions = task.actions
+    return {name: (float(n.low), float(n.high)) for name, n in zip(actions.names, actions.numbers, strict=True)}
+
+
+def compared_with_thesis(task: SaccadeTask) -> str:
+    """One line: how bounds and weights differ from those of the thesis' low-pass eye in the same case."""
+    from orient_eye.task.actions import B_RANGE, K0_RANGE
+
+    own = {(n.symbol, n.low, n.high) for n in task.actions.numbers}
+    of_thesis = {"B": B_RANGE, "k0": K0_RANGE}
+    differ = [s for s, ends in of_thesis.items() if any(symbol == s and (lo, hi) != ends for symbol, lo, hi in own)]
+    told = [f"{s} from {of_thesis[s][0]:g} to {of_thesis[s][1]:g} 1/s" for s in differ]
+    actions = task.actions.identity()
+    for entry in json.loads((data_folder("models") / "weights.json").read_text(encoding="utf-8")):
+        key = entry["of"]
+        same = all(key["actions"].get(name) == actions.get(name) for name in ("actions", "pulse", "C"))
+        if key["plant"]["plant"] == "lpf" and same and (key["judge"], key["band"]) == (task.judge, task.band):
+            shares = {name: task.weights[name] / value for name, value in entry["weights"].items()}
+            told += [f"{1 / r:.2g} times the weight of {name}" for name, r in shares.items() if r and abs(r - 1) > 0.01]
+            break
+    else:
+        told.append("no weights for this case")
+    return f"the thesis' eye has {', '.join(told)}" if told else "bounds and weights are those of the thesis' eye"
 
 
 def _key(task: SaccadeTask) -> dict[str, Any]:

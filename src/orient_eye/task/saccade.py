@@ -22,7 +22,7 @@ from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import Plant, restore_plant
-from orient_eye.state import State
+from orient_eye.state import State, unit
 from orient_eye.task.actions import ACTIONS, ActionSpace, restore_actions
 from orient_eye.task.cases import CASES, Case
 from orient_eye.task.judge import JUDGES, Reward
@@ -135,7 +135,9 @@ class SaccadeTask:
         meant = ACTIONS[actions](plant, driven or targets.driven, pulse=case.pulse, C=case.C, speed_limit=speed_limit)
         judge = judge or targets.of
         told = JUDGES[judge].weights(dict.fromkeys(JUDGES[judge].names, 1.0) if weights is None else weights)
-        task = cls(plant, meant, targets, told, judge, band, horizon_s or plant.horizon_s or HORIZON_S)
+        if horizon_s is None:
+            horizon_s = plant.horizon_s or HORIZON_S
+        task = cls(plant, meant, targets, told, judge, band, horizon_s)
         if weights is not None:
             return task
         return with_known_weights(task)
@@ -191,12 +193,20 @@ class SaccadeTask:
             target: desired orientations, (saccades, 4).
             random: of a plant that is noisy.
         """
-        judge = JUDGES[self.judge]
+        count, numbers = len(start), len(self.actions.numbers)
+        if np.shape(action) != (count, numbers) or np.shape(target) != (count, 4):
+            raise InputError(
+                f"{count} saccades have actions ({count}, {numbers}) and targets ({count}, 4), got {np.shape(action)} "
+                f"and {np.shape(target)}"
+            )
+        judge, target = JUDGES[self.judge], unit(target)
         command = self.actions.command(start, target, action)
         movement = self.plant.move(command, start, self.horizon_s, random)
         measures = movement.measure(self.band, judge.of)
         return Outcome(command, movement, measures, judge.reward(movement, measures, target, self.weights))
 
-    def trajectory(self, start: State, action: Array, target: Array) -> Trajectory:
-        """The movement under an action over time."""
-        return self.plant.move(self.actions.command(start, target, action), start, self.horizon_s).trajectory()
+    def trajectory(
+        self, start: State, action: Array, target: Array, random: np.random.Generator | None = None
+    ) -> Trajectory:
+        """The movement under an action over time; arguments as `perform`'s."""
+        return self.plant.move(self.actions.command(start, target, action), start, self.horizon_s, random).trajectory()

@@ -113,10 +113,10 @@ def solve_at(task: SaccadeTask, saccade: Resolved, steps: Steps) -> dict[str, fl
     moved = np.concatenate([saccade.action + width, saccade.action - width])
     which = np.zeros(len(moved), int)
     found = task.perform(saccade.start[which], moved, saccade.target[which])
-    told = _told(task, saccade.action)
+    command = told(task, saccade.action)
     if not found.measures.settled.all():
         raise InputError(
-            f"with {told} the eye does not settle within {task.horizon_s:g} s on plant {task.plant.name!r}; choose "
+            f"with {command} the eye does not settle within {task.horizon_s:g} s on plant {task.plant.name!r}; choose "
             "another saccade or a wider band"
         )
     terms = found.reward.terms
@@ -138,7 +138,7 @@ def solve_at(task: SaccadeTask, saccade: Resolved, steps: Steps) -> dict[str, fl
     weights = dict(zip(names, solution.tolist(), strict=True))
     if not min(weights.values()) >= 0:
         values = ", ".join(f"{name} {value:.3g}" for name, value in weights.items())
-        raise InputError(f"no positive weights make {told} optimal: {values}; choose another saccade")
+        raise InputError(f"no positive weights make {command} optimal: {values}; choose another saccade")
     return {name: weights.get(name, 1.0) for name in terms}
 
 
@@ -160,6 +160,8 @@ def resolve(task: SaccadeTask, chosen: ChosenSaccade) -> Resolved:
     numbers = [*begin, *end, chosen.B, *(chosen.D or ()), chosen.k0 or 0.0]
     if not np.isfinite(numbers).all():
         raise InputError(f"the chosen saccade must be finite numbers, got {chosen}")
+    if not (chosen.B > 0 and (chosen.k0 is None or chosen.k0 > 0)):
+        raise InputError(f"B and k0 of the chosen saccade are positive, got B = {chosen.B:g}, k0 = {chosen.k0}")
     if max(map(abs, (*begin, *end))) >= 180:
         raise InputError(f"angles lie between -180 and 180 deg, got {begin} and {end}")
     if tuple(begin) == tuple(end):
@@ -182,7 +184,8 @@ def resolve(task: SaccadeTask, chosen: ChosenSaccade) -> Resolved:
 def action_of(task: SaccadeTask, B: float, D: tuple[float, ...], k0: float) -> Array:
     """The action (numbers,) with this B and k0 for every driven motor."""
     final = iter(D)
-    return np.array([{"B": B, "k0": k0}.get(n.symbol) or next(final) for n in task.actions.numbers], dtype=float)
+    value = {"B": lambda: B, "D": lambda: next(final), "k0": lambda: k0}
+    return np.array([value[number.symbol]() for number in task.actions.numbers], dtype=float)
 
 
 def _widths(task: SaccadeTask, saccade: Resolved, steps: Steps) -> Array:
@@ -196,7 +199,8 @@ def _widths(task: SaccadeTask, saccade: Resolved, steps: Steps) -> Array:
     return np.stack([steps.B * of["B"], steps.D * way, steps.k0 * of["k0"]])
 
 
-def _told(task: SaccadeTask, action: Array) -> str:
+def told(task: SaccadeTask, action: Array) -> str:
+    """An action in words: "B = 35, D = 20.33, k0 = 17.5"."""
     return ", ".join(f"{name} = {value:.4g}" for name, value in zip(task.actions.names, action, strict=True))
 
 

@@ -99,7 +99,8 @@ def saccades(targets: Targets, start: ArrayLike, target: ArrayLike) -> tuple[Sta
     return targets.rest(targets.orientation(angles[0])), targets.orientation(angles[1])
 
 
-_AXES = {"yaw": 0, "pitch": 1, "roll": 2}
+_NAMES = {"yaw": "horizontal", "pitch": "vertical", "roll": "torsional"}
+_AXES = {axis: place for place, axis in enumerate(_NAMES)}  # among the angles of `rotations.to_euler`
 _LEAST_DEG = 1e-3  # about the axis, a degree of motor
 _PURE = 0.05  # of what a motor turns about the axis, it may turn about the others
 _REACH = 0.98  # of what the plant can hold
@@ -125,17 +126,18 @@ class AxisTargets:
         self,
         plant: Plant,
         *,
-        name: str = "horizontal",
         axis: str = "yaw",
         limit_deg: float = YAW_LIMIT_DEG,
         driven: tuple[str, ...] | None = None,
     ) -> None:
-        self.plant, self.name, self.axis, self.angles = plant, name, axis, (f"{axis}_deg",)
+        if axis not in _NAMES:
+            raise InputError(f"an axis is {', '.join(_NAMES)}, got {axis!r}")
+        self.plant, self.name, self.axis, self.angles = plant, _NAMES[axis], axis, (f"{axis}_deg",)
         self.driven = _turning(plant, axis) if driven is None else driven
         if not self.driven:
             raise InputError(f"no motor of plant {plant.name!r} turns the eye in {axis}; choose other targets")
         if not 0 < limit_deg < 180:
-            raise InputError(f"the range of {name} targets lies between 0 and 180 deg, got {limit_deg}")
+            raise InputError(f"the range of {self.name} targets lies between 0 and 180 deg, got {limit_deg}")
         self.low, self.high = _held(plant, self.driven, axis)
         self.limit_deg = float(min(limit_deg, _REACH * min(-self.low, self.high)))
         if not self.limit_deg > _LEAST_DEG:
@@ -222,12 +224,12 @@ def _held(plant: Plant, driven: tuple[str, ...], axis: str) -> tuple[float, floa
 
 def vertical(plant: Plant, **options: Any) -> AxisTargets:
     """Rotations up and down; options as those of `AxisTargets`."""
-    return AxisTargets(plant, name="vertical", axis="pitch", **options)
+    return AxisTargets(plant, axis="pitch", **options)
 
 
 def torsional(plant: Plant, **options: Any) -> AxisTargets:
     """Rotations about the line of sight; options as those of `AxisTargets`."""
-    return AxisTargets(plant, name="torsional", axis="roll", **options)
+    return AxisTargets(plant, axis="roll", **options)
 
 
 def make_targets(name: str | None, plant: Plant, **options: Any) -> Targets:
@@ -244,7 +246,7 @@ def make_targets(name: str | None, plant: Plant, **options: Any) -> Targets:
     """
     if name is not None:
         return TARGETS[name](plant, **options)
-    for candidate in ("horizontal", "vertical", "torsional"):
+    for candidate in _NAMES.values():
         with contextlib.suppress(InputError):
             return TARGETS[candidate](plant, **options)
     return TARGETS["horizontal"](plant, **options)

@@ -1,0 +1,182 @@
+"""`orient-eye check`: hold a saccade that was executed on a rig against its prediction."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from orient_eye.errors import InputError
+
+if TYPE_CHECKING:
+    from orient_eye.plants import Plant
+    from orient_eye.rig import Rig
+    from orient_eye.surrogate import Surrogate
+    from orient_eye.sysid.executed import Held, Saccade
+    from orient_eye.tables import Table
+
+_OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
+_CLOCK_S = 1.0  # a recording that begins later than this has a clock of its own
+
+
+@dataclass(frozen=True)
+class Check:
+    """Hold an executed saccade against its prediction: what is off, and what to do about it.
+
+    MODEL is what predicts: a surrogate.json or the run directory of `orient-eye sysid`, a policy, or the run directory
+    of `orient-eye train`. The command is the file that was sent to the rig, the recording what the rig did: t_s, the
+    eye's angle, and, if at hand, where the motors were, with the columns that `orient-eye sysid` reads.
+
+    $ orient-eye check runs/sysid-1/surrogate.json --command saccade.csv --executed executed.csv
+
+    $ orient-eye check runs/train-1 --rig rig.toml --command saccade.csv --executed executed.csv
+    """
+
+    model: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MODEL")]
+    """Surrogate, policy, or run directory of either."""
+    command: Path
+    """CSV file that was sent to the rig, as `orient-eye predict` wrote it."""
+    executed: Path
+    """CSV file of what the rig did, from rest on until the eye stands."""
+    rig: Annotated[str | None, tyro.conf.arg(help_behavior_hint="(default: the surrogate's own)")] = None
+    """Description of the rig (TOML, docs/rigs.md): the files are then in its driver's units."""
+    axis: Annotated[
+        Literal["yaw", "pitch", "roll"] | None, tyro.conf.arg(help_behavior_hint="(default: the surrogate's)")
+    ] = None
+    """Angle of the eye that is compared."""
+    sent_at: Annotated[float | None, tyro.conf.arg(help_behavior_hint="(default: 0, or its first row)")] = None
+    """Time in the recording at which the first row of the command was sent, s."""
+    out: Annotated[Path | None, _OPTIONAL] = None
+    """CSV file to write: the table."""
+
+    def run(self) -> dict[str, Any]:
+        """Compare, print the table and what to do."""
+        import numpy as np
+
+        from orient_eye.cli.places import check_outputs
+        from orient_eye.cli.tables import column, say, table
+        from orient_eye.commands.motor_file import read_command
+        from orient_eye.files import write_table
+        from orient_eye.plants.limits import wiring
+        from orient_eye.state import State
+        from orient_eye.sysid.executed import Saccade, hold_against
+        from orient_eye.sysid.step_response import AXES, axis_angle
+        from orient_eye.tables import read_table
+
+        check_outputs({"--out": self.out}, {"--command": self.command, "--executed": self.executed})
+        plant, surrogate, rig = self._model()
+        wired = None if rig is None else wiring(plant, rig)
+        command = read_command(self.command, plant.motors, wired)
+        recorded = read_table(self.executed, "t_s,motor_deg,eye_deg")
+        time = self._clock(recorded)
+        horizon = max(command.duration_s, float(time[-1])) + plant.step_s
+        start = State(plant.rest(command.rest), command.rest)
+        trajectory = plant.move(command, start, horizon).trajectory()
+        angles = {axis: axis_angle(trajectory.orientation, axis)[0] for axis in AXES}
+        axis: str = self.axis or max(AXES, key=lambda each: float(np.ptp(angles[each])))
+        told = trajectory.motor[0, :, 0] if len(plant.motors) == 1 else None
+        predicted = Saccade(trajectory.time, angles[axis], told)
+        executed = self._executed(recorded, time, axis, plant, rig)
+        held = hold_against(predicted, executed, _answer(surrogate, executed))
+        rows = [asdict(row) for row in held.rows]
+        columns = {
+            "": lambda row: f"{row['name']} [{row['unit']}]",
+            "predicted": column("predicted", ".4g"),
+            "executed": column("executed", ".4g"),
+            "difference": _difference,
+        }
+        say(table(f"Executed against predicted, {axis}.", columns, rows, left=("",)))
+        _say_rest(held)
+        if executed.motor_deg is None and told is not None:
+            say("note: the recording has no motor positions, so motor and eye cannot be told apart", "yellow")
+        for advice in held.advice:
+            say(advice, "bold")
+        if self.out:
+            say(f"in {write_table(self.out, rows)}")
+        result = {key: value for key, value in asdict(held).items() if key != "rows"}
+        return {"model": self.model, "axis": axis, "quantities": rows, **result, "advice": list(held.advice)}
+
+    def _model(self) -> "tuple[Plant, Surrogate | None, Rig | None]":
+        """The plant that predicts, its surrogate where it is one, and the rig."""
+        from orient_eye.learning.policy import NAME, Policy, shipped_policies
+        from orient_eye.plants import make_plant, restore_plant
+        from orient_eye.rig import Rig
+        from orient_eye.surrogate import Surrogate
+
+        rig = None if self.rig is None else Rig.load(self.rig)
+        place = Path(self.model)
+        policy = self.model in shipped_policies() or place.name == NAME or (place / NAME).is_file()
+        if policy:
+            identity = Policy.load(self.model).manifest["task"]["plant"]
+            plant = restore_plant(identity) if rig is None else restore_plant(identity, rig=rig)
+            surrogate: Surrogate | None = getattr(plant, "surrogate", None)
+        else:
+            surrogate = Surrogate.load(place / "surrogate.json" if place.is_dir() else self.model)
+            plant = make_plant("lpf", surrogate=surrogate, rig=rig)
+        if rig is None and surrogate is not None and surrogate.rig is not None:
+            rig = Rig.from_plain(surrogate.rig, f"the rig inside {self.model}")
+        return plant, surrogate, rig
+
+    def _clock(self, recorded: "Table") -> Any:
+        """Times of the recording on the command's clock [s], (rows,).
+
+        Raises:
+            InputError: no column t_s, time that does not rise, or a start that is not in it.
+        """
+        from orient_eye.sysid.recordings import times_of
+
+        time = times_of(recorded)
+        begins = self.sent_at
+        if begins is None:
+            begins = 0.0 if time[0] <= _CLOCK_S else float(time[0])
+        if not begins < time[-1]:
+            raise InputError(f"{self.executed} ends at {time[-1]:g} s, before the command is sent at {begins:g} s")
+        return time - begins
+
+    def _executed(self, recorded: "Table", time: Any, axis: str, plant: "Plant", rig: "Rig | None") -> "Saccade":
+        from orient_eye.motor import Motor
+        from orient_eye.sysid.executed import Saccade
+        from orient_eye.sysid.motor_columns import driven_by_rig
+        from orient_eye.sysid.recordings import eye_of
+
+        _, eye, _ = eye_of(recorded, axis)
+        motor = None
+        if rig is not None and axis in rig.axes:
+            wanted = [{rig.motor(n).column, f"{n}_deg", Motor(n).column} for n in rig.axes[axis]]
+            if all(names & set(recorded.columns) for names in wanted) or rig.drive(axis).column in recorded:
+                motor = driven_by_rig(recorded, rig, axis).position
+        elif len(plant.motors) == 1:
+            column = next((c for c in (plant.motors[0].column, "motor_deg") if c in recorded), None)
+            motor = None if column is None else recorded[column]
+        return Saccade(time, eye, motor)
+
+
+def _answer(surrogate: "Surrogate | None", executed: "Saccade") -> Any:
+    """What the surrogate answers to the motor as it was measured, from rest [deg], (samples,); None without."""
+    from orient_eye.sysid import StepResponse
+    from orient_eye.sysid.identification import response_of
+
+    if surrogate is None or executed.motor_deg is None:
+        return None
+    motor = executed.motor_deg - executed.motor_deg[0]
+    return response_of(surrogate, StepResponse("executed", executed.time, motor, executed.eye_deg))
+
+
+def _difference(row: Any) -> str:
+    both = row["predicted"], row["executed"]
+    return "-" if None in both else f"{both[1] - both[0]:+.3g}"
+
+
+def _say_rest(held: "Held") -> None:
+    from orient_eye.cli.tables import say
+
+    told = [
+        f"residual rms {held.residual_rms_deg:.3f} deg (sensor's noise {held.noise_deg:.3f})",
+        f"eye {1e3 * held.shift_s:+.1f} ms later than predicted",
+    ]
+    if held.motor_shift_s is not None:
+        told.append(f"motor {1e3 * held.motor_shift_s:+.1f} ms later than told")
+    told.append(f"at that shift {held.gain:.3f} times the movement, rms {held.left_rms_deg:.3f} deg left")
+    if held.model_rms_deg is not None:
+        told.append(f"model driven by the measured motor: rms {held.model_rms_deg:.3f} deg")
+    say("; ".join(told))

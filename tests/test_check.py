@@ -1,0 +1,127 @@
+"""An executed saccade held against its prediction: a rig of scipy's, spoilt in one way, and what is advised."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from orient_eye.cli.check import Check
+from orient_eye.errors import InputError
+from orient_eye.rig import Rig, RigMotor
+from orient_eye.surrogate import Surrogate
+from orient_eye.sysid.executed import Saccade, hold_against
+
+Array = np.ndarray
+TIME = np.arange(0, 1.2, 0.005)
+SHARE = np.clip((TIME - 0.05) / 0.12, 0, 1)
+TOLD = 20 * (10 * SHARE**3 - 15 * SHARE**4 + 6 * SHARE**5)
+RIG = Rig(
+    "bench",
+    (RigMotor("left", "counts", 11.4, zero=512), RigMotor("right", "rad", sign=-1, zero=0.1)),
+    {"pitch": {"left": 1.0, "right": -1.0}},
+    command_rate_hz=200,
+)
+MODEL = Surrogate(1.6, wn=22.0, zeta=0.7, dead_time=0.006, motor="left - right", axis="pitch", rig=RIG.to_plain())
+
+
+def eye_of(motor: Array, K: float = 1.6, wn: float = 22.0, zeta: float = 0.7, late: float = 0.006) -> Array:
+    def slope(t: float, state: Array) -> list[float]:
+        return [state[1], wn * wn * (K * np.interp(t - late, TIME, motor) - state[0]) - 2 * zeta * wn * state[1]]
+
+    return np.asarray(solve_ivp(slope, (0, TIME[-1]), [K * motor[0], 0.0], t_eval=TIME, max_step=3e-3).y[0])
+
+
+def limited(speed: float) -> Array:
+    motor = TOLD.copy()
+    for k in range(1, len(motor)):
+        motor[k] = motor[k - 1] + np.clip(TOLD[k] - motor[k - 1], -0.005 * speed, 0.005 * speed)
+    return motor
+
+
+def written(path: Path, motor: Array, eye: Array | None = None) -> Path:
+    columns = {"t_s": TIME, **RIG.to_driver("pitch", motor)}
+    if eye is not None:
+        columns["pitch_deg"] = eye + 0.05 * np.random.default_rng(3).normal(size=len(eye))
+    with path.open("w", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(columns)
+        rows.writerows(np.column_stack(list(columns.values())).tolist())
+    return path
+
+
+DELAYED = np.interp(TIME - 0.03, TIME, TOLD)
+CASES: dict[str, tuple[Array, dict[str, float], float, str]] = {
+    "nothing": (TOLD, {}, 0.0, "^as predicted: off by"),
+    "gain": (TOLD, {"K": 1.45}, 0.0, "9.* % too short: recalibrate the gain .K times 0.90"),
+    "zero": (TOLD, {}, 2.0, r"already at rest the eye stands \+(2.0|1.9)\d deg beside .*zero"),
+    "driver's delay": (DELAYED, {}, 0.0, "30 ms later than predicted; the motor as much"),
+    "dead time": (TOLD, {"late": 0.03}, 0.0, "24 ms later than predicted; identify the dead time"),
+    "slow motor": (limited(120), {}, 0.0, "the motor reaches 12\\d deg/s where 30\\d were predicted.*speed_limit"),
+    "damping": (TOLD, {"zeta": 0.35}, 0.0, "the shape differs .*identify again"),
+    "motor's end": (0.9 * TOLD, {}, 0.0, r"the motor ends -2.0\d deg beside its command"),
+}
+
+
+@pytest.mark.parametrize("what", CASES)
+def test_what_is_wrong_with_a_rig_is_found(what: str, tmp_path: Path) -> None:
+    motor, rig, beside, words = CASES[what]
+    command = written(tmp_path / "command.csv", TOLD)
+    executed = written(tmp_path / "executed.csv", motor, eye_of(motor, **rig) + beside)
+    model = MODEL.save(tmp_path / "surrogate.json")
+    result = Check(str(model), command, executed).run()
+    assert len(result["advice"]) == 1
+    with pytest.raises(AssertionError, match=words):
+        raise AssertionError(result["advice"][0])
+    json.dumps(result)
+
+
+def test_numbers_are_those_of_the_movement(tmp_path: Path) -> None:
+    command = written(tmp_path / "command.csv", TOLD)
+    eye = eye_of(TOLD, zeta=0.6)
+    executed = written(tmp_path / "executed.csv", TOLD, eye)
+    MODEL.save(tmp_path / "surrogate.json")
+    result = Check(str(tmp_path), command, executed, out=tmp_path / "table.csv").run()
+    rows = {row["name"]: row for row in result["quantities"]}
+    assert rows["end"]["predicted"] == pytest.approx(32, abs=0.05)
+    assert rows["end"]["executed"] == pytest.approx(eye[-20:].mean(), abs=0.05)
+    assert rows["overshoot"]["executed"] == pytest.approx(100 * (eye.max() / eye[-1] - 1), abs=0.5)
+    late = TIME[np.flatnonzero(np.abs(eye - eye[-1]) > 0.64)[-1]]  # 2 % of 32 deg
+    assert rows["duration"]["executed"] == pytest.approx(1e3 * late, abs=12)
+    assert rows["motor end"]["executed"] == pytest.approx(20, abs=0.1)
+    assert result["noise_deg"] == pytest.approx(0.05, rel=0.3)
+    table: list[dict[str, Any]] = list(csv.DictReader((tmp_path / "table.csv").open()))
+    assert [row["name"] for row in table] == list(rows)
+
+
+def test_a_recording_without_motors_on_a_clock_of_its_own(tmp_path: Path) -> None:
+    command = written(tmp_path / "command.csv", TOLD)
+    executed = tmp_path / "executed.csv"
+    columns = np.column_stack([TIME + 1700.0, eye_of(TOLD, K=1.7)])
+    np.savetxt(executed, columns, delimiter=";", header="t_s;eye_deg", comments="")
+    model = str(MODEL.save(tmp_path / "surrogate.json"))
+    result = Check(model, command, executed).run()
+    assert result["gain"] == pytest.approx(1.7 / 1.6, abs=0.002)
+    assert result["motor_shift_s"] is None
+    assert result["advice"][0].startswith("the eye goes 6.3 % too far")
+    shifted = Check(model, command, executed, sent_at=1700.0 - 0.02).run()
+    assert shifted["shift_s"] == pytest.approx(0.02, abs=0.001)
+    with pytest.raises(InputError, match="before the command is sent at 1800 s"):
+        Check(model, command, executed, sent_at=1800.0).run()
+
+
+def test_nothing_to_compare_is_refused() -> None:
+    still = Saccade(TIME, 0 * TIME)
+    with pytest.raises(InputError, match="predicted eye does not move"):
+        hold_against(still, still)
+    few = Saccade(TIME[:5], TIME[:5])
+    with pytest.raises(InputError, match=r"5 rows .* record at least 8"):
+        hold_against(Saccade(TIME, TOLD), few)
+
+
+def test_an_eye_that_turns_the_other_way_is_seen() -> None:
+    held = hold_against(Saccade(TIME, 1.6 * TOLD), Saccade(TIME, -1.6 * TOLD))
+    assert "the other way" in held.advice[0]
