@@ -245,7 +245,7 @@ def test_another_package_adds_one_of_each(other_package: dict[str, str], tmp_pat
     trained = (*stiff, "--case", "again", "--targets", "near", *options.split(), "--out", tmp_path / "trained")
     done = run("train", *trained, "--json", env=other_package)
     assert done.returncode == 0, done.stderr
-    assert "weights of the reward: solved by thesis 4.4.5 at B = 35, D = 13.33, k0 = 21" in done.stderr
+    assert "solved by thesis 4.4.5 at B = 35, D = 13.33, k0 = 21" in done.stderr
     amplitudes = [round(r["amplitude_deg"]) for r in json.loads(done.stdout)["table"]]
     assert amplitudes == [5, 10, 20, 30]
     done = run("predict", tmp_path / "trained", "--target", "21", env=other_package)

@@ -111,6 +111,7 @@ class AxisTargets:
 
     Args:
         plant: for which they are made.
+        name: of the set, as it is registered; None for horizontal, vertical or torsional, after the axis.
         axis: "yaw", "pitch" or "roll".
         limit_deg: of the range, to either side; less where the plant's motors do not reach it.
         driven: motors to use; None for those that turn the eye about this axis alone, or where there is none for
@@ -126,13 +127,14 @@ class AxisTargets:
         self,
         plant: Plant,
         *,
+        name: str | None = None,
         axis: str = "yaw",
         limit_deg: float = YAW_LIMIT_DEG,
         driven: tuple[str, ...] | None = None,
     ) -> None:
         if axis not in _NAMES:
             raise InputError(f"an axis is {', '.join(_NAMES)}, got {axis!r}")
-        self.plant, self.name, self.axis, self.angles = plant, _NAMES[axis], axis, (f"{axis}_deg",)
+        self.plant, self.name, self.axis, self.angles = plant, name or _NAMES[axis], axis, (f"{axis}_deg",)
         self.driven = _turning(plant, axis) if driven is None else driven
         if not self.driven:
             raise InputError(f"no motor of plant {plant.name!r} turns the eye in {axis}; choose other targets")
