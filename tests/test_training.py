@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -205,8 +206,8 @@ def test_failed_saccades_stop_nothing_and_are_counted(tmp_path: Path, monkeypatc
     """Every third saccade of the training comes out as not a number."""
     perform = SaccadeTask.perform
 
-    def failing(task: SaccadeTask, start: State, action: np.ndarray, target: np.ndarray) -> Outcome:
-        outcome = perform(task, start, action, target)
+    def failing(task: SaccadeTask, start: State, action: np.ndarray, target: np.ndarray, *random: Any) -> Outcome:
+        outcome = perform(task, start, action, target, *random)
         if len(action) != TINY.saccades_per_update:
             return outcome  # of the evaluation
         measures = replace(outcome.measures, failed=np.arange(len(action)) % 3 == 0)

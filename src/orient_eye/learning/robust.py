@@ -5,55 +5,20 @@ intervals. A policy is judged on the nominal plant, and over the interval (`over
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
-from orient_eye.environments.sb3_env import SaccadeVecEnv
 from orient_eye.learning.evaluation import Yardstick
-from orient_eye.plants.uncertain import Intervals, UncertainPlant, uncertain
-from orient_eye.state import State
-from orient_eye.task.saccade import Outcome, SaccadeTask
+from orient_eye.plants.uncertain import UncertainPlant
 
 Array = NDArray[np.float64]
 DRAWS = 32
 """Eyes drawn for each saccade on which a policy is judged over the interval."""
 _SEED = 95
-
-
-@dataclass(frozen=True)
-class RandomTask(SaccadeTask):
-    """A task whose plant draws from a generator, where nobody gives one.
-
-    Attributes:
-        random: gives the generator.
-    """
-
-    random: Callable[[], np.random.Generator] = np.random.default_rng
-
-    def perform(self, start: State, action: Array, target: Array, random: np.random.Generator | None = None) -> Outcome:
-        """See `SaccadeTask`."""
-        return super().perform(start, action, target, self.random() if random is None else random)
-
-
-def robust_env(saccades: int, task: SaccadeTask, intervals: Intervals, **options: Any) -> SaccadeVecEnv:
-    """The environment in which each saccade is made by another eye of the intervals, drawn from its own generator.
-
-    Args:
-        saccades: environments in the batch.
-        task: the nominal one.
-        intervals: of its plant's numbers.
-        options: of `SaccadeVecEnv`.
-
-    Raises:
-        InputError: intervals that are none.
-    """
-    values = {f.name: getattr(task, f.name) for f in fields(SaccadeTask)} | {"plant": uncertain(task.plant, intervals)}
-    env = SaccadeVecEnv(saccades, RandomTask(**values, random=lambda: env.random), **options)
-    return env
 
 
 def over_the_interval(yardstick: Yardstick, plant: UncertainPlant, action: Array) -> dict[str, float]:
@@ -68,8 +33,7 @@ def over_the_interval(yardstick: Yardstick, plant: UncertainPlant, action: Array
         End-point error [deg], overshoot [share of the amplitude] and settling time [ms], each mean and worst, and the
         mean reward.
     """
-    values = {f.name: getattr(yardstick.task, f.name) for f in fields(SaccadeTask)} | {"plant": plant}
-    task, random = SaccadeTask(**values), np.random.default_rng(_SEED)
+    task, random = replace(yardstick.task, plant=plant), np.random.default_rng(_SEED)
     outcomes = [task.perform(yardstick.start, action, yardstick.target, random) for _ in range(DRAWS)]
     error = np.array([rotations.angle_between(o.measures.final, yardstick.target) for o in outcomes])
     overshoot = np.array([o.measures.overshoot for o in outcomes])

@@ -28,7 +28,7 @@ from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluatio
 from orient_eye.learning.loop import CHECKPOINT_S, Stop, StopRequest, TrainingLoop
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
-from orient_eye.learning.robust import DRAWS, over_the_interval, robust_env
+from orient_eye.learning.robust import DRAWS, over_the_interval
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 from orient_eye.plants.uncertain import uncertain
 from orient_eye.progress import progress_bar
@@ -163,12 +163,11 @@ class _Run:
         return -(-self.settings.warmup // self.settings.saccades_per_update)
 
     def _env(self) -> SaccadeVecEnv:
-        saccades = self.settings.saccades_per_update
-        options: dict[str, Any] = {"infos": False}
-        options["log_reward"] = self.settings.reward_scale == "log"
-        if self.settings.robust:
-            return robust_env(saccades, self.task, self.settings.robust, **options)
-        return SaccadeVecEnv(saccades, self.task, **options)
+        settings, task = self.settings, self.task
+        if settings.robust:  # each saccade on another eye, drawn from the environment's generator
+            task = replace(task, plant=uncertain(task.plant, settings.robust))
+        log = settings.reward_scale == "log"
+        return SaccadeVecEnv(settings.saccades_per_update, task, log_reward=log, infos=False)
 
     def _model(self, env: SaccadeVecEnv, *, seed: int, buffer_seed: int) -> OneStepSAC:
         settings = self.settings

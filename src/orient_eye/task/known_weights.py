@@ -19,6 +19,7 @@ import contextlib
 import hashlib
 import json
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,8 @@ from platformdirs import user_cache_path
 from orient_eye.errors import InputError
 from orient_eye.files import write_text
 from orient_eye.resources import data_folder
-from orient_eye.task.solved_weights import ChosenSaccade, Resolved, Steps, action_of, resolve, solve_at
+from orient_eye.task.actions import B_RANGE, K0_RANGE
+from orient_eye.task.solved_weights import ChosenSaccade, Resolved, Steps, action_of, resolve, solve_at, told
 
 if TYPE_CHECKING:
     from orient_eye.task.saccade import Outcome, SaccadeTask
@@ -59,11 +61,13 @@ def with_known_weights(task: SaccadeTask) -> SaccadeTask:
     Raises:
         InputError: the plant makes no saccade by which weights could be set.
     """
-    key = _key(task)
+    shipped = _key(task)  # which hold for any horizon and range
     for entry in json.loads((data_folder("models") / "weights.json").read_text(encoding="utf-8")):
-        if entry["of"] == key:
+        if entry["of"] == shipped:
             return replace(task, weights=entry["weights"], weights_from=entry["from"])
-    name = hashlib.sha256(json.dumps({**key, "rule": _RULE}, sort_keys=True).encode()).hexdigest()[:24]
+    identity = task.identity()
+    key = {**identity, "weights": None, "rule": _RULE, "version": metadata.version("orient-eye")}
+    name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
     file = user_cache_path("orient-eye") / "weights" / f"{name}.json"
     kept = _read(file, key)
     if kept is None:
@@ -80,13 +84,13 @@ def solve(task: SaccadeTask, error_deg: float | None = None) -> tuple[dict[str, 
         return by_rule(task, ERROR_DEG if error_deg is None else error_deg)
     try:
         saccade = resolve(task, ChosenSaccade())
-        return solve_at(task, saccade, Steps()), f"solved by thesis 4.4.5 at {_told(task, saccade.action)}"
+        return solve_at(task, saccade, Steps()), f"solved by thesis 4.4.5 at {told(task, saccade.action)}"
     except InputError:
         saccade, _ = fastest(task)
     try:
         weights = solve_at(task, saccade, Steps())
-        told = _told(task, saccade.action)
-        return weights, f"solved by thesis 4.4.5 at the fastest saccade with {OVERSHOOT:.0%} overshoot, {told}"
+        command = told(task, saccade.action)
+        return weights, f"solved by thesis 4.4.5 at the fastest saccade with {OVERSHOOT:.0%} overshoot, {command}"
     except InputError:
         return by_rule(task)
 
@@ -168,9 +172,9 @@ def by_rule(task: SaccadeTask, error_deg: float = ERROR_DEG) -> tuple[dict[str, 
         "accuracy": float(max(balance, felt, worth)),
         "energy": 1.0,
         "duration": duration,
-        "overshoot": OVERSHOOT_SHARE * (1 + DURATION_SHARE) * terms[1]["energy"] / 0.01,
+        "overshoot": OVERSHOOT_SHARE * (1 + DURATION_SHARE) * terms[1]["energy"] / OVERSHOOT,
     }
-    return weights, f"by rule (docs/weights.md) at the fastest saccade, {_told(task, saccade.action)}"
+    return weights, f"by rule (docs/weights.md) at the fastest saccade, {told(task, saccade.action)}"
 
 
 def bounds(task: SaccadeTask) -> dict[str, tuple[float, float]]:
@@ -181,8 +185,6 @@ def bounds(task: SaccadeTask) -> dict[str, tuple[float, float]]:
 
 def compared_with_thesis(task: SaccadeTask) -> str:
     """One line: how bounds and weights differ from those of the thesis' low-pass eye in the same case."""
-    from orient_eye.task.actions import B_RANGE, K0_RANGE
-
     own = {(n.symbol, n.low, n.high) for n in task.actions.numbers}
     of_thesis = {"B": B_RANGE, "k0": K0_RANGE}
     differ = [s for s, ends in of_thesis.items() if any(symbol == s and (lo, hi) != ends for symbol, lo, hi in own)]
@@ -201,7 +203,7 @@ def compared_with_thesis(task: SaccadeTask) -> str:
 
 
 def _key(task: SaccadeTask) -> dict[str, Any]:
-    """What the weights of a task depend on, in plain values."""
+    """What shipped weights are of, in plain values."""
     identity = task.identity()
     actions = {key: value for key, value in identity["actions"].items() if key not in ("low", "high")}
     kept = {key: identity[key] for key in ("plant", "judge", "band")}
@@ -214,7 +216,3 @@ def _read(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
         return kept if kept["of"] == key and isinstance(kept["from"], str) and kept["weights"] else None
     except (OSError, ValueError, KeyError, TypeError):  # none, or damaged: solve again
         return None
-
-
-def _told(task: SaccadeTask, action: Array) -> str:
-    return ", ".join(f"{name} = {value:.4g}" for name, value in zip(task.actions.names, action, strict=True))
