@@ -81,11 +81,13 @@ def fast_enough(rig: TrueRig, time: np.ndarray, motor: np.ndarray) -> bool:
     speed = np.diff(motor, prepend=motor[0]) / step
     hardest = np.inf if rig.acceleration is None else rig.acceleration
     slack = 1 + 1e-3  # files are rounded
+    # Of a driver in counts to whole ones, each by half a count: up to two counts in a second difference.
+    count = 0.0 if rig.counts_per_deg is None else 1 / rig.counts_per_deg
     acceleration = np.abs(np.diff(speed, prepend=0.0)).max() / step
     return bool(
         np.abs(motor).max() <= rig.reach * slack
         and np.abs(speed).max() <= rig.speed * slack
-        and acceleration <= hardest * slack
+        and acceleration <= hardest * slack + 2 * count / step**2
     )
 
 
