@@ -1,6 +1,6 @@
 """How long one waits before anything happens: whole processes, medians.
 
-    python benchmarks/startup.py
+python benchmarks/startup.py
 """
 
 import statistics
