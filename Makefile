@@ -32,7 +32,7 @@ demo: $(INSTALLED)
 	@echo "  $(BIN)/orient-eye view $(DEMO)/train/recording.rrd    the saccades in 3-D, at several stages of training"
 
 test: $(INSTALLED)
-	$(BIN)/python -m pytest $(COVERAGE)
+	$(BIN)/python -m pytest -n auto $(COVERAGE)
 
 check: $(INSTALLED)
 	$(BIN)/ruff check src tests scripts benchmarks examples
