@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.files import write_text
 from orient_eye.motor import Motor
 from orient_eye.resources import data_folder
 
 Array = NDArray[np.float64]
-AXES = ("yaw", "pitch", "roll")
 _UNITS = {"deg": 1.0, "rad": radians(1.0)}
 _LARGEST_BYTES = 1 << 20
 

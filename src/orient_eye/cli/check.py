@@ -56,11 +56,12 @@ class Check:
         from orient_eye.cli.places import check_outputs
         from orient_eye.cli.tables import column, say, table
         from orient_eye.commands.motor_file import read_command
+        from orient_eye.constants import ANGLES as AXES
         from orient_eye.files import write_table
         from orient_eye.plants.limits import wiring
         from orient_eye.state import State
         from orient_eye.sysid.executed import Saccade, hold_against
-        from orient_eye.sysid.step_response import AXES, axis_angle
+        from orient_eye.sysid.step_response import axis_angle
         from orient_eye.tables import read_table
 
         check_outputs({"--out": self.out}, {"--command": self.command, "--executed": self.executed})

@@ -17,10 +17,11 @@ import numpy as np
 
 from orient_eye import rotations
 from orient_eye.commands.motor_file import Wiring
+from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.motor import Motor, names
 from orient_eye.plants import Plant
-from orient_eye.rig import AXES, Rig
+from orient_eye.rig import Rig
 from orient_eye.surrogate import Surrogate
 
 Limits = Mapping[str, Mapping[str, Any]]

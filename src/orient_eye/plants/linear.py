@@ -18,7 +18,7 @@ from orient_eye.commands import Sampled, as_command
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND, HORIZON_S, STEP_S
 from orient_eye.errors import InputError
-from orient_eye.movement import Movement, energy_of
+from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures, View, measure, measure_angle, merged
 from orient_eye.movement.trajectory import Trajectory, concatenate
 from orient_eye.plants import CLOSED_FORM, PulseRates
@@ -30,7 +30,7 @@ from orient_eye.plants.linear_response import (
     sampled_response,
     second_order_poles,
 )
-from orient_eye.plants.simulated import Given, Run, SimulatedPlant
+from orient_eye.plants.simulated import Given, GivenMovement, Run, SimulatedPlant
 from orient_eye.rig import Rig
 from orient_eye.state import State
 from orient_eye.surrogate import Surrogate, shipped_surrogates
@@ -263,7 +263,7 @@ class ClosedMovement:
 
 
 @dataclass(frozen=True)
-class PathMovement:
+class PathMovement(GivenMovement):
     """The surrogate along a path of its motor, exact at samples; see `orient_eye.movement.Movement`.
 
     Attributes:
@@ -277,22 +277,6 @@ class PathMovement:
     given: Given
     angle: Array
     rate: Array
-
-    @property
-    def saturated(self) -> NDArray[np.bool_]:
-        """See `orient_eye.movement.Movement`."""
-        return self.given.saturated
-
-    @property
-    def limited(self) -> NDArray[np.bool_]:
-        """See `orient_eye.movement.Movement`."""
-        return self.given.limited
-
-    def energy(self) -> Array:
-        """See `orient_eye.movement.Movement`."""
-        given = self.given
-        time = self.plant.times(given.motor.shape[1])
-        return energy_of(given.command, given.motor, time, given.saturated | given.limited)
 
     def measure(self, band: float = BAND, of: View = "orientation") -> Measures:
         """See `orient_eye.movement.Movement`; of an eye that turns about one axis."""

@@ -11,7 +11,7 @@ from orient_eye.commands import Command, as_command
 from orient_eye.constants import HORIZON_S, LONGEST_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.motor import Motor, names, ranges
-from orient_eye.movement import Movement, SampledMovement
+from orient_eye.movement import Movement, SampledMovement, energy_of
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import SIMULATED, Pace, PulseRates
 from orient_eye.plants.limited_motor import follow
@@ -51,6 +51,34 @@ class Given:
         """Some of the saccades; the command must know how to give some of itself."""
         parts = (self.told, self.motor, self.start, self.saturated, self.limited, self.failed)
         return Given(self.command[which], *(part[which] for part in parts))  # type: ignore[index, arg-type]
+
+
+@dataclass(frozen=True)
+class GivenMovement:
+    """What a movement, measured in whatever way, knows from what its motors did; see `orient_eye.movement.Movement`.
+
+    Attributes:
+        plant: that moved.
+        given: command and path of the motors.
+    """
+
+    plant: "SimulatedPlant"
+    given: Given
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """See `orient_eye.movement.Movement`."""
+        return self.given.saturated
+
+    @property
+    def limited(self) -> NDArray[np.bool_]:
+        """See `orient_eye.movement.Movement`."""
+        return self.given.limited
+
+    def energy(self) -> Array:
+        """See `orient_eye.movement.Movement`."""
+        given, time = self.given, self.plant.times(self.given.motor.shape[1])
+        return energy_of(given.command, given.motor, time, given.saturated | given.limited)
 
 
 class SimulatedPlant(ABC):

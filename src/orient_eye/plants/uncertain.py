@@ -19,7 +19,7 @@ from orient_eye.commands import as_command
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND
 from orient_eye.errors import InputError
-from orient_eye.movement import Movement, energy_of
+from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures, View, measure_angle, merged
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import Plant
@@ -30,7 +30,7 @@ from orient_eye.plants.linear_response import (
     sampled_response,
     second_order_poles,
 )
-from orient_eye.plants.simulated import Given
+from orient_eye.plants.simulated import Given, GivenMovement
 from orient_eye.state import State
 
 Array = NDArray[np.float64]
@@ -134,7 +134,7 @@ def uncertain(plant: Plant, intervals: Intervals | None = None) -> UncertainPlan
 
 
 @dataclass(frozen=True)
-class UncertainMovement:
+class UncertainMovement(GivenMovement):
     """Saccades of eyes that each have their own numbers; see `orient_eye.movement.Movement`.
 
     Attributes:
@@ -146,21 +146,6 @@ class UncertainMovement:
     plant: UncertainPlant
     given: Given
     numbers: Numbers
-
-    @property
-    def saturated(self) -> NDArray[np.bool_]:
-        """See `orient_eye.movement.Movement`."""
-        return self.given.saturated
-
-    @property
-    def limited(self) -> NDArray[np.bool_]:
-        """See `orient_eye.movement.Movement`."""
-        return self.given.limited
-
-    def energy(self) -> Array:
-        """See `orient_eye.movement.Movement`."""
-        given, time = self.given, self.plant.times(self.given.motor.shape[1])
-        return energy_of(given.command, given.motor, time, given.saturated | given.limited)
 
     @cached_property
     def sampled(self) -> NDArray[np.bool_]:

@@ -27,6 +27,7 @@ import numpy as np
 from mujoco.rollout import rollout
 from numpy.typing import NDArray
 
+from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import build_model, load_spec, motors
 from orient_eye.files import write_text
@@ -39,7 +40,6 @@ from orient_eye.sysid.comparison import HeldOut
 from orient_eye.sysid.fit import Estimate, autocorrelation, effective_samples
 from orient_eye.sysid.models import Parameter
 from orient_eye.sysid.recordings import MIN_ROWS, read_recording
-from orient_eye.sysid.step_response import AXES
 from orient_eye.tables import read_lines, table_of
 
 Array = NDArray[np.float64]

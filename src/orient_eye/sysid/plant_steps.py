@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.motor import Motor, check_driven
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import Plant
 from orient_eye.state import State
-from orient_eye.sysid.step_response import AXES, StepResponse, axis_angle
+from orient_eye.sysid.step_response import StepResponse, axis_angle
 
 Array = NDArray[np.float64]
 DURATION_S = 0.8

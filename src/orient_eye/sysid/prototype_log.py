@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.rig import Rig
 from orient_eye.rotations import rotation, to_euler
-from orient_eye.sysid.step_response import AXES, StepResponse, axis_angle
+from orient_eye.sysid.step_response import StepResponse, axis_angle
 from orient_eye.tables import Table
 
 Array = NDArray[np.float64]

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.rig import Rig
 from orient_eye.sysid import prototype_log
 from orient_eye.sysid.motor_columns import axis_of, driven_by_motor, driven_by_rig
 from orient_eye.sysid.recording_checks import noise_of
-from orient_eye.sysid.step_response import AXES, StepResponse, axis_angle
+from orient_eye.sysid.step_response import StepResponse, axis_angle
 from orient_eye.tables import Table, numbers, read_lines, table_of
 
 Array = NDArray[np.float64]

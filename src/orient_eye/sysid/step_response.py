@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 
 Array = NDArray[np.float64]
-AXES = ("yaw", "pitch", "roll")
 
 
 @dataclass(frozen=True)
