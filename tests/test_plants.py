@@ -40,6 +40,7 @@ OURS: list[tuple[str, dict[str, Any]]] = [
     ("mujoco", {"accurate": True}),
     ("mujoco", {"eye": "eve_v3"}),
     ("mujoco", {"gravity": True}),
+    ("tavares", {"accurate": True}),
     ("tavares", {"as_published": True}),
 ]
 ALL = [*OURS, *((name, {}) for name in PLANTS if (name, {}) not in OURS)]

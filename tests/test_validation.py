@@ -13,8 +13,9 @@ from orient_eye import validation
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import Plant
+from orient_eye.plants.elastic_kernel import STATIC_FRICTION
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.plants.tavares import STATIC_FRICTION, TavaresPlant
+from orient_eye.plants.tavares import TavaresPlant
 from orient_eye.rotations import FORWARD, rotation, to_euler
 from orient_eye.state import State
 from orient_eye.validation import Check, against_author, against_reference, against_truth, author_runs

@@ -215,7 +215,7 @@ def test_defaults_are_resolved_on_the_plant() -> None:
 
 
 def test_weights_of_the_whole_eye() -> None:
-    """MuJoCo and the NumPy reference, two programs, agree; the saccade is at the onset of its overshoot."""
+    """MuJoCo and the compiled reference, two programs, agree; the saccade is at the onset of its overshoot."""
     task = task_on(MujocoPlant(threads=1))
     D, k0 = resolved(task, ChosenSaccade())
     assert (D, k0) == (pytest.approx(20.268, abs=0.005), pytest.approx(16.302, abs=0.01))

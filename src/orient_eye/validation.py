@@ -1,4 +1,4 @@
-"""The MuJoCo eye held against three witnesses: the thesis author's own runs, the NumPy reference, and a
+"""The MuJoCo eye held against three witnesses: the thesis author's own runs, the compiled reference, and a
 converged solution of the equations of motion.
 
     report = validate(random_runs=20, seed=0)

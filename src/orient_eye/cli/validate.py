@@ -6,7 +6,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Validate:
-    """Hold the MuJoCo eye against the author's runs, the NumPy reference and a converged solution.
+    """Hold the MuJoCo eye against the author's runs, the compiled reference and a converged solution.
 
     Prints a table of largest orientation errors; exits with 1 when one is beyond its limit.
     """

@@ -201,10 +201,11 @@ PLANTS: Registry[PlantKind] = Registry(
             ),
         ),
         "tavares": PlantKind(
-            "the thesis' simulator in NumPy, an independent reference",
+            "the thesis' simulator, compiled: an independent reference, and a fast one",
             "orient_eye.plants.tavares:TavaresPlant",
             (
                 _EYE,
+                Option("accurate", bool, False, "Integrate by Runge-Kutta's method instead of the thesis' Euler step."),
                 _GRAVITY,
                 Option("as_published", bool, False, "The author's program to the letter."),
                 _RIG,
