@@ -23,6 +23,7 @@ from orient_eye.cli.simulate import Simulate
 from orient_eye.commands.motor_file import read_command
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
+from orient_eye.learning.config import TrainConfig
 from orient_eye.motor import Motor
 from orient_eye.plants import make_plant, restore_plant
 from orient_eye.plants.limited_motor import follow, peaks
@@ -31,6 +32,7 @@ from orient_eye.plants.linear import LinearPlant
 from orient_eye.rig import Rig, RigMotor
 from orient_eye.surrogate import Surrogate
 from orient_eye.tables import read_table
+from orient_eye.task.actions import restore_actions
 from orient_eye.task.saccade import SaccadeTask
 from test_policy_commands import sensible_policy
 
@@ -491,3 +493,25 @@ def test_a_C_that_cannot_hold_the_limit_is_never_silent(case: str, capsys: pytes
     assert row["motor_speed_deg_s"] > 100
     assert "too fast " in shown.split("no C")[0]
     assert "no C holds 1 of 1 commands to the speed limit of 100 deg/s" in shown
+
+
+def test_a_varying_C_takes_the_rig_s_own_speed_limit_where_nobody_says_another() -> None:
+    """Of the driven motors the least; the thesis' 7200 deg/s where none is limited, and whatever is said."""
+    fast, slow = (RigMotor(f"motor{i}", speed_limit=v) for i, v in ((1, 9000.0), (2, 300.0)))
+    rig = Rig("two", (fast, slow), {"yaw": {"motor2": 1.0}, "roll": {"motor1": 1.0}})
+
+    def V(plant: str, rig: Rig | str | None, **options: Any) -> Any:
+        made = make_plant(plant) if rig is None else make_plant(plant, rig=rig)
+        task = SaccadeTask.of_case(made, "2-varying", weights=(1, 1, 1, 1), **options)
+        assert restore_actions(task.actions.identity(), task.plant).identity() == task.actions.identity()
+        return task.actions.identity()["speed_limit"]
+
+    assert V("mujoco", None) == V("lpf", None) == 7200
+    assert V("lpf", "prototype") == 349
+    assert V("lpf", "prototype", speed_limit=1000.0) == 1000
+    assert V("mujoco", rig) == V("mujoco", rig, driven=("motor1", "motor2")) == 300
+    assert V("mujoco", rig, driven=("motor1", "motor3")) == 9000
+    config = TrainConfig("lpf", {"rig": "prototype"}, case="2-varying", weights=(1, 1, 1, 1))
+    problem = Problem("lpf", {"rig": "prototype"})
+    for task in (config.make_task(), problem.task(*problem.made(), "2-varying", (1, 1, 1, 1))):
+        assert task.actions.identity()["speed_limit"] == 349

@@ -4,6 +4,7 @@ The witnesses are written from the definitions: quadrature of the convolution, i
 differential equation, partial fractions in a hundred digits, and plain fine sampling.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import mpmath
@@ -13,19 +14,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
+from scipy.optimize import OptimizeResult as OdeResult
 from scipy.signal import lsim
 
 from orient_eye.commands.exponentials import ExponentialSum, Term, impulse_response
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
 from orient_eye.movement.measures import Measures
+from orient_eye.plants.linear import LinearPlant
 from orient_eye.plants.linear_response import (
     LinearResponse,
     measure_closed_form,
     sampled_response,
     second_order_poles,
 )
-from orient_eye.rotations import to_euler
+from orient_eye.rotations import about, to_euler
+from orient_eye.state import State
+from orient_eye.surrogate import Surrogate
+from orient_eye.sysid import identify_plant
 
 Array = NDArray[np.float64]
 Poles = tuple[Any, ...]
@@ -487,3 +493,73 @@ def test_sampled_rows_have_their_own_plants_and_rest_stays() -> None:
     still, speed = sampled_response(K, poles, L, np.full((3, 300), 13.7), 0.002)
     np.testing.assert_array_equal(still, K * 13.7)
     np.testing.assert_array_equal(speed, 0)
+
+
+# --- motors that jump at time 0 -------------------------------------------------------------------
+
+
+def delayed(poles: Poles, L: float, t: Array, tau: Array, before: float, angle: float, rate: float) -> Array:
+    """Angle at times t of an eye behind a dead time, whose motor stands at `before` until it follows tau from 0 on."""
+
+    def stretch(state: list[float], low: float, high: float, u: Callable[[float], float]) -> OdeResult:
+        def slope(time: float, y: Array) -> list[float]:
+            if len(poles) == 1:
+                return [poles[0] * (K * u(time) - y[0])]
+            damp, square = real(poles)
+            return [y[1], square * (K * u(time) - y[0]) - damp * y[1]]
+
+        return solve_ivp(slope, (low, high), state, rtol=1e-9, atol=1e-10, max_step=2e-3, dense_output=True)
+
+    waiting = stretch([angle, rate][: len(poles)], 0.0, max(L, 1e-12), lambda _: before)
+    moving = stretch(list(waiting.y[:, -1]), L, float(t[-1]), lambda time: float(np.interp(time - L, t, tau)))
+    return np.where(t < L, waiting.sol(t)[0], moving.sol(t)[0])
+
+
+@pytest.mark.parametrize("L", [0.0, 0.004, 0.0083, 0.3])
+@pytest.mark.parametrize("poles", [(17.5,), second_order_poles(22.0, 0.7), second_order_poles(9.0, 1.6)])
+def test_a_motor_that_jumps_reaches_the_eye_after_the_dead_time(poles: Poles, L: float) -> None:
+    """From where motor and eye rest, and from where the eye is elsewhere and turns, which needs no dead time."""
+    t = np.arange(0, 0.4, 0.001)
+    tau = np.stack([np.full(t.size, 10.0), 4 + 30 * np.minimum(t, 0.1)])
+    number: dict[str, Any] = {"w0": poles[0]}
+    if len(poles) == 2:
+        damp, square = real(poles)
+        number = {"wn": square**0.5, "zeta": damp / 2 / square**0.5}
+    eye = LinearPlant(Surrogate(K, dead_time=L, **number))
+    before, beside, spin = np.array([0.0, -3.0]), np.array([0.0, 2.0]), np.array([0.0, 40.0])
+    velocity = np.zeros((2, 3))
+    velocity[:, 2] = spin
+    start = State(about("yaw", K * before + beside), before[:, None], velocity)
+    moved = eye.move(tau[..., None], start).trajectory().yaw_deg
+    for row in range(2):
+        right = delayed(poles, L, t, tau[row], before[row], K * before[row] + beside[row], spin[row])
+        np.testing.assert_allclose(moved[row], right, atol=2e-5)
+    assert (moved[0, t <= L] == 0).all()
+
+
+def test_rows_that_jump_have_their_own_plants() -> None:
+    poles, L = second_order_poles(np.array([10.0, 20.0]), np.array([0.3, 2.0])), np.array([0.0, 0.0131])
+    motor, before = np.random.default_rng(1).normal(size=(2, 60)), np.array([1.0, -7.0])
+    angle, rate = sampled_response(K, poles, L, motor, 0.002, before)
+    for i in range(2):
+        one = sampled_response(K, tuple(w[i] for w in poles), L[i], motor[i : i + 1], 0.002, before[i : i + 1])
+        np.testing.assert_allclose([angle[i], rate[i]], [one[0][0], one[1][0]], rtol=0, atol=1e-9)
+    same = sampled_response(K, poles, L, motor, 0.002, motor[:, 0])
+    np.testing.assert_array_equal(same, sampled_response(K, poles, L, motor, 0.002))
+    with pytest.raises(InputError, match="rest before"):
+        sampled_response(K, poles, L, motor, 0.002, before[:1])
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"wn": 22.0, "zeta": 0.7, "dead_time": 0.0083},
+        {"wn": 80.0, "zeta": 1.4, "dead_time": 0.012},
+        {"w0": 25.0, "dead_time": 0.02},
+        {"wn": 12.0, "zeta": 0.9},
+    ],
+)
+def test_steps_of_a_surrogate_tell_its_own_numbers(numbers: dict[str, Any]) -> None:
+    found = identify_plant(LinearPlant(Surrogate(1.6, **numbers)), (2.0, -5.0, 10.0)).surrogate
+    for name, right in {"K": 1.6, "w0": None, "wn": None, "zeta": None, "dead_time": 0.0, **numbers}.items():
+        assert getattr(found, name) == (None if right is None else pytest.approx(right, rel=1e-5)), name

@@ -18,7 +18,9 @@ from orient_eye.plants import make_plant
 from orient_eye.resources import data_folder
 from orient_eye.rig import Rig, RigMotor
 from orient_eye.state import State
-from orient_eye.sysid.physical import fit_physical, parameters, read_recordings, write_eye
+from orient_eye.sysid.fitted_eye import replayed, write_eye
+from orient_eye.sysid.physical import fit_physical, parameters
+from orient_eye.sysid.physical_recordings import read_recordings
 
 Array = NDArray[np.float64]
 TRUE = {"stiffness_vertical": 14.0, "friction": 0.03, "rest_length_vertical": 0.36, "rest_length_horizontal": 0.24}
@@ -170,6 +172,8 @@ def test_what_is_not_determined_is_named_and_not_written(tmp_path: Path, recorde
     with pytest.raises(InputError, match=r"do not determine .*rest_length_horizontal.*no eye was written"):
         physical(vertical, "thesis", ("friction",), tmp_path / "run")
     assert not (tmp_path / "run" / "eye.xml").exists()
+    assert (tmp_path / "run" / "recordings.png").exists()
+    assert (tmp_path / "run" / "recording.rrd").exists()
     told = json.loads((tmp_path / "run" / "physical.json").read_text())
     assert told["model"] is None
     assert told["fitted"]["rest_length_horizontal"]["undetermined"]
@@ -200,8 +204,35 @@ def test_bounds_keep_away_from_divergence(eye: str) -> None:
 def test_the_command_writes_numbers_and_an_eye(tmp_path: Path, recorded: list[Path]) -> None:
     result = physical(recorded, "thesis", None, tmp_path / "run")
     assert json.loads((tmp_path / "run" / "physical.json").read_text()) == result
+    assert result["files"] == ["recordings.png", "recording.rrd"]
+    assert all((tmp_path / "run" / name).stat().st_size > 10_000 for name in result["files"])
     assert result["held_out_rms_deg"] < 3 * NOISE_DEG
     assert make_plant("mujoco", eye=result["model"]).model.dof_damping[0] == result["fitted"]["friction"]["value"]
+
+
+@installed
+def test_what_is_drawn_is_what_was_measured_and_what_the_written_eye_does(tmp_path: Path, recorded: list[Path]) -> None:
+    """The measured angles without the zeros of their sensors; and the file moved by the plant as the motors moved."""
+    recordings = read_recordings(recorded[:3])
+    fit = fit_physical(recordings)
+    write_eye(fit, tmp_path / "eye.xml")
+    plant = make_plant("mujoco", eye=str(tmp_path / "eye.xml"))
+    measured, fitted = replayed(fit, recordings)
+    assert measured.motor_names == fitted.motor_names == ("motor1", "motor2", "motor3")
+    for i, recording in enumerate(recordings):
+        time = recording.time - recording.time[0]
+        grid = np.arange(0, time[-1], 0.001)
+        motor = np.stack([np.interp(grid, time, column) for column in recording.motor.T], axis=-1)[None]
+        told = plant.move(motor, State(plant.rest(motor[:, 0]), motor[:, 0])).trajectory()
+        shown = fitted.time < time[-1] - 0.005
+        for k, name in enumerate(("yaw_deg", "pitch_deg", "roll_deg")):
+            right = np.interp(fitted.time[shown], told.time, getattr(told, name)[0])
+            np.testing.assert_allclose(getattr(fitted, name)[i, shown], right, atol=0.02)
+            rows = np.interp(time, grid, getattr(told, name)[0])
+            zero = np.mean(recording.angles[:, k] - rows)
+            np.testing.assert_allclose(rows - recording.angles[:, k] + zero, fit.residuals[i][:, k], atol=0.02)
+            nearest = np.interp(time, measured.time, getattr(measured, name)[i]) - (recording.angles[:, k] - zero)
+            assert np.sqrt(np.mean(nearest**2)) < 1.5 * NOISE_DEG  # a noisy angle, drawn at other times
 
 
 def test_a_rig_tells_its_motors_in_counts(tmp_path: Path, recorded: list[Path]) -> None:

@@ -161,6 +161,7 @@ def test_planned_steps_keep_the_limits_in_the_drivers_units(limits: dict[str, fl
     rig = planned(**limits)
     steps = plan_steps(rig, "pitch")
     assert [s.amplitude_deg for s in steps] == [s * round(share * 80, 1) for share in SHARES for s in (1, -1)]
+    assert len({s.until_s for s in steps}) == 1  # one --until cuts all of their recordings
     files = write_plan(steps, rig, "pitch", tmp_path)
     for step, file in zip(steps, files, strict=False):
         table = read_table(tmp_path / file, "")

@@ -9,6 +9,7 @@ import tyro
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:
+    from orient_eye.commands.motor_file import Wiring, WrittenCommand
     from orient_eye.plants import Plant
     from orient_eye.rig import Rig
     from orient_eye.surrogate import Surrogate
@@ -46,6 +47,8 @@ class Check:
     """Angle of the eye that is compared."""
     sent_at: Annotated[float | None, tyro.conf.arg(help_behavior_hint="(default: 0, or its first row)")] = None
     """Time in the recording at which the first row of the command was sent, s."""
+    band: Annotated[float | None, tyro.conf.arg(help_behavior_hint="(default: the policy's own, else 0.02)")] = None
+    """Settling band: the share of the movement around its end into which it comes to stay when it is over."""
     out: Annotated[Path | None, _OPTIONAL] = None
     """CSV file to write: the table."""
 
@@ -55,7 +58,6 @@ class Check:
 
         from orient_eye.cli.places import check_outputs
         from orient_eye.cli.tables import column, say, table
-        from orient_eye.commands.motor_file import read_command
         from orient_eye.constants import ANGLES as AXES
         from orient_eye.files import write_table
         from orient_eye.plants.limits import wiring
@@ -65,9 +67,9 @@ class Check:
         from orient_eye.tables import read_table
 
         check_outputs({"--out": self.out}, {"--command": self.command, "--executed": self.executed})
-        plant, surrogate, rig = self._model()
+        plant, surrogate, rig, band = self._model()
         wired = None if rig is None else wiring(plant, rig)
-        command = read_command(self.command, plant.motors, wired)
+        command = self._command(plant, wired)
         recorded = read_table(self.executed, "t_s,motor_deg,eye_deg")
         time = self._clock(recorded)
         horizon = max(command.duration_s, float(time[-1])) + plant.step_s
@@ -78,7 +80,7 @@ class Check:
         told = trajectory.motor[0, :, 0] if len(plant.motors) == 1 else None
         predicted = Saccade(trajectory.time, angles[axis], told)
         executed = self._executed(recorded, time, axis, plant, rig)
-        held = hold_against(predicted, executed, _answer(surrogate, executed))
+        held = hold_against(predicted, executed, _answer(surrogate, executed, predicted), band)
         rows = [asdict(row) for row in held.rows]
         columns = {
             "": lambda row: f"{row['name']} [{row['unit']}]",
@@ -87,36 +89,55 @@ class Check:
             "difference": _difference,
         }
         say(table(f"Executed against predicted, {axis}.", columns, rows, left=("",)))
-        _say_rest(held)
+        _say_rest(held, band)
         if executed.motor_deg is None and told is not None:
             say("note: the recording has no motor positions, so motor and eye cannot be told apart", "yellow")
         for advice in held.advice:
             say(advice, "bold")
         if self.out:
             say(f"in {write_table(self.out, rows)}")
-        result = {key: value for key, value in asdict(held).items() if key != "rows"}
-        return {"model": self.model, "axis": axis, "quantities": rows, **result, "advice": list(held.advice)}
+        result = {**asdict(held), "advice": list(held.advice)}
+        del result["rows"]
+        return {"model": self.model, "axis": axis, "quantities": rows, "band": band, **result}
 
-    def _model(self) -> "tuple[Plant, Surrogate | None, Rig | None]":
-        """The plant that predicts, its surrogate where it is one, and the rig."""
+    def _model(self) -> "tuple[Plant, Surrogate | None, Rig | None, float]":
+        """The plant that predicts, its surrogate where it is one, the rig, and the settling band."""
         from orient_eye.learning.policy import NAME, Policy, shipped_policies
         from orient_eye.plants import make_plant, restore_plant
         from orient_eye.rig import Rig
         from orient_eye.surrogate import Surrogate
+        from orient_eye.sysid.executed import BAND
 
         rig = None if self.rig is None else Rig.load(self.rig)
         place = Path(self.model)
         policy = self.model in shipped_policies() or place.name == NAME or (place / NAME).is_file()
         if policy:
-            identity = Policy.load(self.model).manifest["task"]["plant"]
+            task = Policy.load(self.model).manifest["task"]
+            identity, band = task["plant"], float(task["band"])
             plant = restore_plant(identity) if rig is None else restore_plant(identity, rig=rig)
             surrogate: Surrogate | None = getattr(plant, "surrogate", None)
         else:
+            band = BAND
             surrogate = Surrogate.load(place / "surrogate.json" if place.is_dir() else self.model)
             plant = make_plant("lpf", surrogate=surrogate, rig=rig)
         if rig is None and surrogate is not None and surrogate.rig is not None:
             rig = Rig.from_plain(surrogate.rig, f"the rig inside {self.model}")
-        return plant, surrogate, rig
+        return plant, surrogate, rig, band if self.band is None else self.band
+
+    def _command(self, plant: "Plant", wired: "Wiring | None") -> "WrittenCommand":
+        """The command that was sent.
+
+        Raises:
+            InputError: it is none of this plant or rig.
+        """
+        from orient_eye.commands.motor_file import read_command
+
+        try:
+            return read_command(self.command, plant.motors, wired)
+        except InputError as error:
+            if wired is not None:
+                raise
+            raise InputError(f"{error}. A command for a rig's driver is read with its rig: --rig RIG.toml") from error
 
     def _clock(self, recorded: "Table") -> Any:
         """Times of the recording on the command's clock [s], (rows,).
@@ -152,15 +173,23 @@ class Check:
         return Saccade(time, eye, motor)
 
 
-def _answer(surrogate: "Surrogate | None", executed: "Saccade") -> Any:
-    """What the surrogate answers to the motor as it was measured, from rest [deg], (samples,); None without."""
+def _answer(surrogate: "Surrogate | None", executed: "Saccade", predicted: "Saccade") -> Any:
+    """What the surrogate answers to the motor as it was measured, from rest [deg], (samples,); None without.
+
+    Before the first row the motor did what it was told.
+    """
+    import numpy as np
+
     from orient_eye.sysid import StepResponse
     from orient_eye.sysid.identification import response_of
 
-    if surrogate is None or executed.motor_deg is None:
+    if surrogate is None or executed.motor_deg is None or predicted.motor_deg is None:
         return None
-    motor = executed.motor_deg - executed.motor_deg[0]
-    return response_of(surrogate, StepResponse("executed", executed.time, motor, executed.eye_deg))
+    before, lost = executed.time <= 0, predicted.time < executed.time[0]
+    rest = executed.motor_deg[before].mean() if before.any() else predicted.motor_deg[0]
+    motor = np.append(predicted.motor_deg[lost], executed.motor_deg) - rest
+    time = np.append(predicted.time[lost], executed.time)
+    return response_of(surrogate, StepResponse("executed", time, motor, np.zeros_like(time)))[lost.sum() :]
 
 
 def _difference(row: Any) -> str:
@@ -168,9 +197,13 @@ def _difference(row: Any) -> str:
     return "-" if None in both else f"{both[1] - both[0]:+.3g}"
 
 
-def _say_rest(held: "Held") -> None:
+def _say_rest(held: "Held", band: float) -> None:
     from orient_eye.cli.tables import say
 
+    share = f"{100 * band:g} % of the movement"
+    if held.band_is_noise:
+        share = f"four times its sensor's noise, in which {share} cannot be seen"
+    say(f"duration: until the eye stays within {held.band_deg:.3g} deg of its end, {share}")
     told = [
         f"residual rms {held.residual_rms_deg:.3f} deg (sensor's noise {held.noise_deg:.3f})",
         f"eye {1e3 * held.shift_s:+.1f} ms later than predicted",

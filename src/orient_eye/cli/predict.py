@@ -134,11 +134,16 @@ class Predict:
         from orient_eye.cli.tables import say
 
         written, plant = [], task.plant
-        rig = "" if wired is None else f" --plant {plant.name} --rig {self.another_plant.plant_options['rig']}"
+        surrogate = getattr(plant, "surrogate", None)
+        stranger = surrogate is not None and surrogate.eye is None  # whose motors are none of the default plant's
+        where = f" --plant {plant.name}" if stranger or wired is not None else ""
+        where += " --surrogate SURROGATE.json" if stranger else ""
+        where += "" if wired is None else f" --rig {self.another_plant.plant_options['rig']}"
+        where += "" if wired is None else f" --horizon {task.horizon_s:g}"  # its file ends where the motors stand
         if self.command:
             written.append(write(self.command, plant, wired, written_path(task, outcome, start, 0, wired)))
             written[-1].say("motor command")
-            say(f"to try it: orient-eye simulate --motor {self.command}{rig}")
+            say(f"to try it: orient-eye simulate --motor {self.command}{where}")
         if self.back:
             motors, step_s = (plant.motors, plant.step_s) if wired is None else (wired.limited, wired.step_s)
             back = way_back(final_of(plant, outcome, 0), motors, step_s)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from orient_eye.constants import BAND, SPEED_LIMIT
+from orient_eye.constants import BAND
 from orient_eye.errors import InputError
 from orient_eye.task.cases import Case
 
@@ -28,13 +28,13 @@ class Problem:
     plant: str = "lpf"
     """The plant that makes the saccades."""
     plant_options: dict[str, Any] = field(default_factory=dict)
-    targets: str = "horizontal"
+    targets: Annotated[str | None, _hint("(default: horizontal, or what the plant turns)")] = None
     """Set of targets: which directions there are, and which motors are driven."""
     pulse: Annotated[str | None, _hint("(optional)")] = None
     """A pulse by itself, instead of a case."""
     C: Annotated[float | Literal["varying"] | None, _hint("(default: the pulse's own)")] = None
     """Onset rate of --pulse, 1/s, or varying: the one that brings the motor to its speed limit."""
-    speed_limit: float = SPEED_LIMIT
+    speed_limit: Annotated[float | None, _hint("(default: that of the slowest driven motor, else 7200)")] = None
     """Motor speed to which a varying C brings the command, deg/s."""
     band: float = BAND
     """Settling band, share of the amplitude."""

@@ -75,7 +75,7 @@ class Sysid:
     """Angle of the eye that is watched, and that the rig's drive turns."""
     model: Annotated[
         Literal["best", "first_order", "first_order_dead_time", "second_order", "second_order_dead_time"] | None,
-        _default("first_order, as in the thesis; of recordings best"),
+        _default("first_order, as in the thesis; of rigs and recordings best"),
     ] = None
     """Model of the surrogate; best is the one that describes the data best."""
     force: bool = False
@@ -122,6 +122,7 @@ class Sysid:
 
         if self.recording is not None and found.rig is None:
             files = " ".join(map(str, self.recording))
+            files += "" if self.until is None else f" --until {self.until:g}"
             say(
                 f"rig: {folder}/rig.toml is a first description of your rig. Its motor is in deg, without limits; fill "
                 f"in what is a comment there, then: orient-eye sysid --recording {files} --rig {folder}/rig.toml"
@@ -159,7 +160,7 @@ class Sysid:
         columns = {
             "file": lambda row: row["file"],
             "step [deg]": column("amplitude_deg", "+.4g"),
-            "way back from [s]": column("until_s", ".2f"),
+            "way back from [s]": column("until_s", ".3f"),
             "lasts [s]": column("s", ".2f"),
         }
         say(table(f"Steps of {rig.drive_name(axis)} to record.", columns, rows, left=("file",)))
@@ -190,7 +191,7 @@ class Sysid:
         plant = make_plant(self.plant, **self.plant_options, **limits)
         amplitudes = _AMPLITUDES if self.amplitudes is None else self.amplitudes
         held_out = _HELD_OUT if self.held_out is None else self.held_out
-        return identify_plant(plant, amplitudes, held_out, self.motor, self.axis, self.model or "first_order")
+        return identify_plant(plant, amplitudes, held_out, self.motor, self.axis, self.model)
 
 
 def _tell(found: "Identification", result: dict[str, Any]) -> None:

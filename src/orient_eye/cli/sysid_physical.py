@@ -10,8 +10,9 @@ if TYPE_CHECKING:
     from orient_eye.cli.sysid import Sysid
     from orient_eye.rig import Rig
     from orient_eye.sysid.physical import PhysicalFit
+    from orient_eye.sysid.physical_recordings import Measured
 
-FITTED = "eye.xml"
+FITTED, PICTURE, RECORDING = "eye.xml", "recordings.png", "recording.rrd"
 _OTHERS = ("amplitudes", "held_out", "motor", "axis", "model")  # options of the other ways to identify
 
 
@@ -53,10 +54,10 @@ def physical(
     rig: "Rig | None" = None,
     force: bool = False,
 ) -> dict[str, Any]:
-    """Fit, write physical.json and the fitted eye into a run directory, tell, and return the numbers.
+    """Fit, write the fitted eye, physical.json, a picture and a recording into a run directory, and tell.
 
     Args:
-        recordings: files, see `orient_eye.sysid.physical.read_physical`.
+        recordings: files, see `orient_eye.sysid.physical_recordings.read_physical`.
         eye: to start from, preset or MJCF file.
         frozen: parameters that keep the eye's value; None for the horizontal stiffness and rest lengths.
         out: run directory; None for runs/sysid-DATE-TIME.
@@ -65,15 +66,21 @@ def physical(
         rig: whose motors' units the recordings are in; None for deg.
         force: write the eye even with parameters that the recordings do not determine.
 
+    Returns:
+        What physical.json holds.
+
     Raises:
-        InputError: the recordings do not determine the parameters and it is not forced (physical.json is there
+        InputError: the recordings do not determine the parameters and it is not forced (all but the eye is there
             then), or see `fit_physical`, `read_physical` and `RunDirectory.create`.
     """
     from orient_eye.cli.tables import say
     from orient_eye.run_directory import RunDirectory
-    from orient_eye.sysid.physical import fit_physical, read_recordings, summary, write_eye
+    from orient_eye.sysid.fitted_eye import summary, write_eye
+    from orient_eye.sysid.physical import fit_physical
+    from orient_eye.sysid.physical_recordings import read_recordings
 
-    fit = fit_physical(read_recordings(recordings, eye, row_times, until, rig), eye, frozen)
+    measured = read_recordings(recordings, eye, row_times, until, rig)
+    fit = fit_physical(measured, eye, frozen)
     told: dict[str, Any] = {"physical": True, "recording": list(recordings), "eye": eye, "frozen": list(fit.frozen)}
     told |= {"row_times": row_times, "until": until, "rig": rig and rig.name, "force": force}
     run = RunDirectory.create(out, "sysid", told)
@@ -82,20 +89,40 @@ def physical(
         open_ends = tuple(e.parameter.name for e in fit.estimates)
     written = force or not open_ends
     model = str(run.path / FITTED) if written else None
-    result: dict[str, Any] = {**summary(fit), "model": model, "out": str(run.path)}
+    files = [] if model is None else write_eye(fit, model)
+    pictures = _show(fit, measured, run.path)
+    result: dict[str, Any] = {**summary(fit), "model": model, "files": pictures, "out": str(run.path)}
     run.write_json("physical.json", result)
     _tell(fit)
+    say(f"measured and fitted: {run.path}/{PICTURE}; orient-eye view {run.path}/{RECORDING}")
     if model is None:
         raise InputError(
             f"these recordings do not determine {', '.join(open_ends)}, so no eye was written (the fit is in "
             f"{run.path}): record movements of other axes, or name with --frozen also those that are to keep the "
             "eye's own value, or say --force"
         )
-    files = write_eye(fit, model)
     if files:
         say(f"note: {FITTED} still refers to {', '.join(files)}; copy what it needs beside it", "yellow")
     say(f"fitted eye: {model} (orient-eye train --plant mujoco --eye {model})")
     return result
+
+
+def _show(fit: "PhysicalFit", measured: "Sequence[Measured]", folder: Path) -> list[str]:
+    """The picture and the recording of what was measured and what the fitted eye does; names of the files."""
+    from orient_eye.eyes.model import build_model, motors
+    from orient_eye.figures import save
+    from orient_eye.figures.identification import fitted_eye
+    from orient_eye.recording import record
+    from orient_eye.sysid.fitted_eye import replayed
+
+    model = build_model(fit.eye)
+    save(fitted_eye(fit, measured, [motor.name for motor in motors(model)]), folder / PICTURE)
+    trajectory, reference = replayed(fit, measured)
+    values = ", ".join(f"{e.parameter.name} {e} {e.parameter.unit}" for e in fit.estimates)
+    notes = f"Recorded movements, in grey those of the fitted eye ({values}), drawn as the eye {Path(fit.eye).name}."
+    titles = [each.name for each in measured]
+    record(folder / RECORDING, trajectory, model=model, titles=titles, reference=reference, notes=notes)
+    return [PICTURE, RECORDING]
 
 
 def _tell(fit: "PhysicalFit") -> None:

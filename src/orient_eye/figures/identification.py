@@ -1,6 +1,7 @@
 """Pictures of an identification, named after the thesis' figures."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
@@ -9,6 +10,12 @@ from numpy.typing import NDArray
 
 from orient_eye.figures import DATA, MODEL, OTHER, tidy
 from orient_eye.sysid.identification import Identification
+
+if TYPE_CHECKING:
+    from orient_eye.sysid.physical import PhysicalFit
+    from orient_eye.sysid.physical_recordings import Measured
+
+_OF_ANGLES = {"yaw": DATA, "pitch": MODEL, "roll": OTHER}
 
 
 def figure_3_5(found: Identification) -> Figure:
@@ -106,4 +113,37 @@ def recorded_steps(found: Identification) -> Figure:
         for axes in line:
             tidy(axes)
             axes.set_xlabel("time [s]")
+    return figure
+
+
+def fitted_eye(fit: "PhysicalFit", recordings: "Sequence[Measured]", motors: Sequence[str]) -> Figure:
+    """Recorded angles with those of the fitted eye, the residuals, and the motors that move.
+
+    Args:
+        fit: to these recordings.
+        recordings: with their motors in the order of the names.
+        motors: their names.
+    """
+    figure = Figure(figsize=(13, 2.9 * len(recordings) + 0.6), layout="constrained")
+    grid = figure.subplots(len(recordings), 3, squeeze=False, width_ratios=(3, 2, 2))
+    for line, recording, residuals in zip(grid, recordings, fit.residuals, strict=True):
+        eye, residual, motor = line
+        time = recording.time - recording.time[0]
+        for i, axis in enumerate(recording.axes):
+            off, colour = -residuals[:, i], _OF_ANGLES[axis]
+            rms = float(np.sqrt(np.mean(off**2)))
+            eye.plot(time, recording.angles[:, i], "o", color=colour, ms=3, alpha=0.45, label=f"{axis}, measured")
+            eye.plot(time, recording.angles[:, i] - off, color=colour, lw=1.3, label=f"{axis}, fitted")
+            residual.plot(time, off, ".-", color=colour, lw=0.6, ms=3, label=f"{axis}, rms {rms:.2f} deg")
+        for name, position in zip(motors, recording.motor.T, strict=True):
+            if np.ptp(position):
+                motor.plot(time, position, ".-", lw=0.9, ms=3, label=name)
+        eye.set(title=recording.name, ylabel="eye [deg]")
+        residual.set(title="measured - fitted", ylabel="residual [deg]")
+        motor.set(title="motors", ylabel="motor [deg]")
+        residual.axhline(0, color="black", lw=0.6)
+        for axes in line:
+            tidy(axes)
+            axes.set_xlabel("time [s]")
+            axes.legend(frameon=False, fontsize=8)
     return figure

@@ -65,7 +65,9 @@ class PulseRates:
 
 
 SIMULATED = Pace(32, 60)
-CLOSED_FORM = Pace(128, 300)
+CLOSED_FORM = Pace(64, 300)
+LIMITED = Pace(64, 30)
+"""Of an eye in closed form whose motor's limits are simulated."""
 
 
 @runtime_checkable
@@ -133,6 +135,10 @@ class Plant(Protocol):
 
     def identity(self) -> dict[str, Any]:
         """What makes this plant this one, in plain values: `plant`, its name, and what its kind restores it from."""
+        ...
+
+    def twin(self) -> Plant | None:
+        """A quicker plant of the same eye, on which what is good here may be looked for; None where there is none."""
         ...
 
     def drawn(self) -> mujoco.MjModel:

@@ -21,7 +21,7 @@ from orient_eye.errors import InputError
 from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures, View, measure, measure_angle, merged
 from orient_eye.movement.trajectory import Trajectory, concatenate
-from orient_eye.plants import CLOSED_FORM, PulseRates
+from orient_eye.plants import CLOSED_FORM, LIMITED, PulseRates
 from orient_eye.plants.limits import are_limited, limited_surrogate, travel_s
 from orient_eye.plants.linear_response import (
     LinearResponse,
@@ -58,7 +58,6 @@ class LinearPlant(SimulatedPlant):
     """
 
     name = "lpf"
-    pace = CLOSED_FORM
 
     def __init__(
         self,
@@ -83,6 +82,7 @@ class LinearPlant(SimulatedPlant):
         limited = are_limited(self.motors)
         first_order = numbers.w0 is not None and not numbers.dead_time
         self.slow_pole = numbers.w0 if first_order and not limited else None
+        self.pace = LIMITED if limited else CLOSED_FORM
         self.horizon_s = self._horizon() if limited or numbers.range is not None else None
         as_thesis = first_order and not limited and numbers.eye is not None
         self.pulse_rates = None if as_thesis else PulseRates.around([numbers.w0 or numbers.wn or 0.0])
@@ -141,10 +141,11 @@ class LinearPlant(SimulatedPlant):
         return MixedMovement(changed, some, ClosedMovement(self, command[~changed], closed.samples), command)
 
     def _sampled(self, given: Given) -> "PathMovement":
-        motor = given.motor[..., 0]
+        """Behind the dead time the eye answers to where its motor stood before time 0, which is that of the start."""
+        motor, before = given.motor[..., 0], given.start.motor[:, 0]
         s = self.surrogate
-        angle, rate = sampled_response(s.K, self.poles, s.dead_time, motor, self.step_s)
-        off = self._angle(given.start.orientation) - s.K * motor[:, 0]
+        angle, rate = sampled_response(s.K, self.poles, s.dead_time, motor, self.step_s, before)
+        off = self._angle(given.start.orientation) - s.K * before
         off = np.where(np.abs(off) < _SAME_DEG, 0.0, off)
         spin = given.start.angular_velocity[:, rotations.AXES[s.axis]]
         if np.abs(off).max(initial=0) > 0 or np.abs(spin).max(initial=0) > 0:

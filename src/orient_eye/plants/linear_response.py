@@ -308,7 +308,12 @@ def _falling_root(low: Array, high: Array, f: Callable[[Rows, Array], tuple[Arra
 
 
 def sampled_response(
-    gain: float | Array, poles: Sequence[complex | Numbers], dead_time: float | Array, motor: Array, step_s: float
+    gain: float | Array,
+    poles: Sequence[complex | Numbers],
+    dead_time: float | Array,
+    motor: Array,
+    step_s: float,
+    before: Array | None = None,
 ) -> tuple[Array, Array]:
     """Response to a motor that moves along straight lines between samples, exact at the samples' times.
 
@@ -319,8 +324,10 @@ def sampled_response(
         gain: K; a number or (saccades,).
         poles: w [rad/s], each a number or (saccades,): one real, or two, real or conjugate.
         dead_time: L [s]; a number or (saccades,).
-        motor: positions (saccades, samples) [deg]; before the first the motor and the eye rest there.
+        motor: positions (saccades, samples) [deg].
         step_s: interval between samples [s].
+        before: where motor and eye rest before the first sample, at which the motor jumps, (saccades,) [deg of
+            motor]; None for its first position.
 
     Returns:
         Angle [deg] and angular velocity [deg/s], (saccades, samples).
@@ -334,6 +341,8 @@ def sampled_response(
         raise InputError(f"a motor's path has the shape (saccades, samples), got {motor.shape}")
     w = [np.asarray(pole) for pole in poles]
     lag = np.asarray(sum(1 / x for x in w)).real
+    if before is not None and np.shape(before) != motor.shape[:1]:
+        raise InputError(f"motors rest before at (saccades,) = {motor.shape[:1]} positions, got {np.shape(before)}")
     path = np.ascontiguousarray(motor.T)
     slope = np.diff(path, axis=0, append=path[-1:]) / step_s
     bend = np.diff(slope, axis=0, prepend=0.0)
@@ -348,8 +357,14 @@ def sampled_response(
     moving, at = knot >= 0, np.maximum(knot, 0)
     own = np.arange(len(motor))[None]
     free_angle, free_rate = _moved(_free_motion(w, since), free[:, at, own])
+    rest = path[0] if before is None else np.asarray(before, float)
+    jump = np.stack([rest - path[0], np.zeros_like(rest)])
+    if jump.any():  # which is behind by all of it when it reaches the eye
+        reached = np.maximum(samples - delay, 0.0) * step_s
+        behind = _moved(_free_motion(w, reached), jump)
+        free_angle, free_rate = free_angle + behind[0], free_rate + behind[1]
     ahead = slope[at, own]
-    angle = np.where(moving, path[at, own] + (ahead * (since - lag) + free_angle), path[0])
+    angle = np.where(moving, path[at, own] + (ahead * (since - lag) + free_angle), rest)
     rate = np.where(moving, ahead + free_rate, 0.0)
     return (gain * angle).T, (gain * rate).T
 

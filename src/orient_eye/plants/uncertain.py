@@ -179,8 +179,8 @@ class UncertainMovement(GivenMovement):
         return measure_angle(time, angle, rate, final, self.plant.surrogate.axis, failed, band=band)
 
     def _sample(self, which: NDArray[np.bool_]) -> tuple[Array, Array]:
-        numbers, motor = self.numbers[which], self.given.motor[which, :, 0]
-        return sampled_response(numbers.K, numbers.poles, numbers.dead_time, motor, self.plant.step_s)
+        numbers, motor, before = self.numbers[which], self.given.motor[which, :, 0], self.given.start.motor[which, 0]
+        return sampled_response(numbers.K, numbers.poles, numbers.dead_time, motor, self.plant.step_s, before)
 
     def trajectory(self) -> Trajectory:
         """The movement at the plant's samples."""

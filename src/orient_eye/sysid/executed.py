@@ -12,16 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
-from orient_eye.constants import BAND
 from orient_eye.errors import InputError
 from orient_eye.sysid.recording_checks import noise_of
 
 Array = NDArray[np.float64]
+BAND = 0.02
+"""Settling band where nobody says another: a share of the movement, as is usual of step responses."""
 _MIN_ROWS = 8
 _BEGUN = 0.005  # of the amplitude: then the eye has begun to move
 _SHIFTS_S = (-0.1, 0.3)  # looked for
 _WINDOW_S = 0.03  # over which the motor's speed is taken
 _END_DEG, _END_SHARE = 0.5, 0.03  # off by less is as predicted
+_NOISY = 4.0  # times the sensor's noise: no band is narrower
 _LATE_S = 0.005
 _SLOWER = 0.92  # of the predicted speed
 _MORE_OVERSHOOT = 0.03
@@ -58,6 +60,8 @@ class Held:
 
     Attributes:
         rows: quantities of both.
+        band_deg: around its end, into which a movement comes to stay when it is over.
+        band_is_noise: whether that is four times the sensor's noise, as the band asked for is less.
         residual_rms_deg: executed - predicted, from rest each.
         shift_s: by which the executed eye comes later than predicted.
         gain: how far it goes of what was predicted, at that shift.
@@ -69,6 +73,8 @@ class Held:
     """
 
     rows: tuple[Row, ...]
+    band_deg: float
+    band_is_noise: bool
     residual_rms_deg: float
     shift_s: float
     gain: float
@@ -79,7 +85,7 @@ class Held:
     advice: tuple[str, ...]
 
 
-def hold_against(predicted: Saccade, executed: Saccade, model_answer: Array | None = None) -> Held:
+def hold_against(predicted: Saccade, executed: Saccade, model_answer: Array | None = None, band: float = BAND) -> Held:
     """Compare an executed saccade with its prediction.
 
     Args:
@@ -87,10 +93,13 @@ def hold_against(predicted: Saccade, executed: Saccade, model_answer: Array | No
         executed: as recorded.
         model_answer: movement [deg] that the model answers to the motor as it was measured, from rest, (samples,) of
             the executed saccade.
+        band: in which the eye has settled, a share of the predicted movement; the sensor's noise may ask for more.
 
     Raises:
-        InputError: too few rows, no overlap in time, or a prediction that does not move.
+        InputError: a band that is no share, too few rows, no overlap in time, or a prediction that does not move.
     """
+    if not 0 < band < 1:
+        raise InputError(f"the settling band is a share of the movement between 0 and 1, got {band:g}")
     if len(executed.time) < _MIN_ROWS or executed.time[-1] <= 0 or executed.time[0] >= predicted.time[-1]:
         raise InputError(
             f"the recording has {len(executed.time)} rows from {executed.time[0]:g} to {executed.time[-1]:g} s, the "
@@ -104,11 +113,12 @@ def hold_against(predicted: Saccade, executed: Saccade, model_answer: Array | No
     noise = noise_of(executed.time, executed.eye_deg)
     moving = np.abs(told.eye_deg - predicted.eye_deg[0]) > _BEGUN * abs(amplitude)
     resting = np.arange(len(moving)) < max(int(moving.argmax()), 1)
-    band = max(BAND * abs(amplitude), 4 * noise)
-    ours = _measured(told, resting, band)
-    theirs = _measured(executed, resting, band)
+    asked, drowned = band * abs(amplitude), _NOISY * noise
+    band_deg = max(asked, drowned)
+    ours = _measured(told, resting, band_deg)
+    theirs = _measured(executed, resting, band_deg)
     expected, seen = told.eye_deg - ours["start"], executed.eye_deg - theirs["start"]
-    shift, gain, left = _shift_and_gain(executed.time, seen, predicted.time, predicted.eye_deg - predicted.eye_deg[0])
+    shift, gain, left = _shift_and_gain(executed.time, seen, predicted.time, predicted.eye_deg - ours["start"])
     units = {"start": "deg", "end": "deg", "movement": "deg", "overshoot": "%", "duration": "ms"}
     rows = [Row(name, unit, ours[name], theirs[name]) for name, unit in units.items()]
     motor_shift = None
@@ -120,17 +130,18 @@ def hold_against(predicted: Saccade, executed: Saccade, model_answer: Array | No
             for name, unit in (("end", "deg"), ("top speed", "deg/s"))
         ]
         if executed.motor_deg is not None and predicted.motor_deg is not None:
-            motor = executed.motor_deg - executed.motor_deg[resting].mean()
-            motor_shift, _, _ = _shift_and_gain(
-                executed.time, motor, predicted.time, predicted.motor_deg - predicted.motor_deg[0]
-            )
+            reached = executed.motor_deg - executed.motor_deg[resting].mean()
+            wanted = predicted.motor_deg - told.motor_deg[resting].mean()
+            motor_shift, _, _ = _shift_and_gain(executed.time, reached, predicted.time, wanted)
     held = Held(
         rows=tuple(rows),
+        band_deg=band_deg,
+        band_is_noise=drowned > asked,
         residual_rms_deg=_rms(seen - expected),
         shift_s=shift,
         gain=gain,
         left_rms_deg=left,
-        model_rms_deg=None if model_answer is None else _rms(seen - model_answer),
+        model_rms_deg=None if model_answer is None else _rms(seen - (model_answer - model_answer[resting].mean())),
         motor_shift_s=motor_shift,
         noise_deg=noise,
         advice=(),

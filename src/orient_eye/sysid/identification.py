@@ -98,7 +98,7 @@ def identify_plant(
     held_out: Sequence[float] = (),
     motor: str | None = None,
     axis: str | None = None,
-    model: str = "first_order",
+    model: str | None = None,
 ) -> Identification:
     """Identify a plant as the thesis does (section 3.3.1, Figures 3.5 and 3.6).
 
@@ -112,11 +112,13 @@ def identify_plant(
         motor: that steps; None for one that turns the eye about the axis.
         axis: yaw, pitch or roll; None for what the motor, or the plant, turns: see `plant_steps`.
         model: of the surrogate: first_order for the thesis' as above; another of `MODELS`, or best, for the one
-            that describes the data best, fitted to all steps together.
+            that describes the data best, fitted to all steps together; None for best on a rig, a plant with bounds of
+            its own for the pulses, and else for first_order.
 
     Raises:
         InputError: see `plant_steps` and `fit_model`.
     """
+    model = model or ("first_order" if plant.pulse_rates is None else "best")
     asked = [float(a) for a in amplitudes]
     if not asked:
         raise InputError("no step amplitude given; name at least one, in deg of motor, as 5 10 20")
@@ -131,8 +133,10 @@ def identify_plant(
     nearest = int(np.abs(np.abs(A) - REFERENCE_DEG).argmin())
     w0 = fits[nearest][0]["w0"]
     compared = compare(steps, judges)
-    warnings = [*done.warnings, *(f"{s.name}: {w}" for s, (f,) in zip(steps, fits, strict=True) for w in f.warnings)]
-    if abs(abs(A[nearest]) - REFERENCE_DEG) > 0.5:
+    warnings = list(done.warnings)
+    if model == "first_order":
+        warnings += [f"{s.name}: {w}" for s, (f,) in zip(steps, fits, strict=True) for w in f.warnings]
+    if model == "first_order" and abs(abs(A[nearest]) - REFERENCE_DEG) > 0.5:
         warnings.append(
             f"w0 of the surrogate is that at {A[nearest]:g} {done.motor.unit}, the step nearest to {REFERENCE_DEG:g}"
         )
@@ -149,6 +153,7 @@ def identify_plant(
     else:
         chosen = _chosen(compared, model).fit
         numbers, undetermined = _numbers(chosen), chosen.undetermined
+        warnings += chosen.warnings
         how = f"{chosen.model.title}, fitted to all together"
     number = Surrogate(
         motor=done.motor.name,

@@ -1,8 +1,8 @@
 """Parameters of an elastic eye's MJCF from recordings, with MuJoCo's own `mujoco.sysid`.
 
-    fit = fit_physical(read_recordings(paths, "thesis"), "thesis")
+    fit = fit_physical(read_recordings(paths, "thesis"), "thesis")      # physical_recordings
     fit["friction"].interval, fit.held_out_rms_deg, fit.warnings
-    write_eye(fit, "fitted.xml")                     # make_plant("mujoco", eye="fitted.xml")
+    write_eye(fit, "fitted.xml")                                        # fitted_eye
 
 The eye of `eyes.build_model` moves as the recorded motors did, from rest at the first row, and stiffness and rest
 length of its elastics (one of each for a default class of the MJCF) and its friction are fitted to the recorded
@@ -17,10 +17,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
-from pathlib import Path
 from types import ModuleType
-from typing import Any
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -30,147 +27,25 @@ from numpy.typing import NDArray
 from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import build_model, load_spec, motors
-from orient_eye.files import write_text
-from orient_eye.motor import Motor
 from orient_eye.plants.equilibrium import rest_orientation
-from orient_eye.rig import Rig
-from orient_eye.rotations import rotation, to_euler
-from orient_eye.sysid import prototype_log
+from orient_eye.rotations import rotation
 from orient_eye.sysid.comparison import HeldOut
 from orient_eye.sysid.fit import Estimate, autocorrelation, effective_samples
 from orient_eye.sysid.models import Parameter
-from orient_eye.sysid.recordings import MIN_ROWS, read_recording
-from orient_eye.tables import read_lines, table_of
+from orient_eye.sysid.physical_recordings import Measured, angles_of
 
 Array = NDArray[np.float64]
 INSTALL = "pip install 'orient-eye[physical]'"
-_QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 _REST = "rest_length_"
 _FACTOR = 10.0  # bounds of stiffness and friction, from the eye's own value
 _STABLE = 0.9  # of the friction at which the explicit step diverges, 2 inertia / step
 _TAUT = 0.98  # longest rest length, of the length at rest: an elastic that is slack there pulls nothing
-_DIGITS = 6  # significant ones that MuJoCo writes into a file
+DIGITS = 6
+"""Significant ones that MuJoCo writes into a file."""
 _DIFFERENCE = 1e-5  # of the eye's own value, in the central differences of the intervals
 _UNTOLD = 0.5  # half width of an interval, of the value
 _ILL_CONDITIONED = 1e2  # of the Jacobian with columns of unit length
 _ITERATIONS = 30
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A recorded movement of an eye and its motors.
-
-    Attributes:
-        name: of the file.
-        time: [s], rising, any spacing, (rows,).
-        motor: measured positions of all motors of the eye [deg], (rows, motors).
-        axes: which angles were measured, of yaw, pitch, roll.
-        angles: [deg], (rows, axes).
-        warnings: of the reader.
-    """
-
-    name: str
-    time: Array
-    motor: Array
-    axes: tuple[str, ...]
-    angles: Array
-    warnings: tuple[str, ...] = ()
-
-    def until(self, time: float) -> "Measured":
-        """Its rows up to a time [s]."""
-        kept = self.time <= time
-        if kept.sum() < MIN_ROWS or not np.ptp(self.motor[kept], axis=0).any():
-            raise InputError(
-                f"{self.name} has {kept.sum()} rows until {time:g} s; at least {MIN_ROWS} are needed, with a motor "
-                "that moves: name a later time"
-            )
-        return replace(self, time=self.time[kept], motor=self.motor[kept], angles=self.angles[kept])
-
-
-def read_recordings(
-    paths: Sequence[Path],
-    eye: str = "thesis",
-    row_times: str = "even",
-    until: float | None = None,
-    rig: Rig | None = None,
-) -> tuple[Measured, ...]:
-    """Read recordings of an eye; see `read_physical`.
-
-    Args:
-        paths: of the files.
-        eye: whose motors they are.
-        row_times: see `read_physical`.
-        until: leave out what comes after this time [s], in the clock of the files; None for nothing.
-        rig: see `read_physical`.
-
-    Raises:
-        InputError: also when a file is named twice, or fewer than 8 rows are left.
-    """
-    resolved = [Path(path).resolve() for path in paths]
-    for path in resolved:
-        if resolved.count(path) > 1:
-            raise InputError(f"{path.name} is named twice; a recording counts once")
-    eye_motors = motors(build_model(eye, visual=False))
-    read = tuple(read_physical(Path(path), eye_motors, row_times, rig) for path in paths)
-    return read if until is None else tuple(each.until(until) for each in read)
-
-
-def read_physical(path: Path, eye_motors: Sequence[Motor], row_times: str = "even", rig: Rig | None = None) -> Measured:
-    """Read a recording: a table as `orient-eye simulate` writes it, or a log of the prototype.
-
-    Columns: t_s; a motor's (tau2_deg) where it moved, motors without one stand at 0; q_w, q_x, q_y, q_z, or any of
-    yaw_deg, pitch_deg, roll_deg. Others are ignored.
-
-    Args:
-        path: of the file.
-        eye_motors: of the eye that is to be fitted.
-        row_times: of a prototype log, see `recordings.read_recording`.
-        rig: whose motors of the same names tell their positions in their driver's units, in its columns.
-
-    Raises:
-        InputError: unreadable, no such columns, fewer than 8 rows, time that does not rise, or motors that stand.
-    """
-    lines = read_lines(path)
-    if lines and prototype_log.recognised(lines[0][1]):
-        step = read_recording(path, row_times=row_times)
-        if step.orientation is None or any(motor.name not in step.motors for motor in eye_motors):
-            raise InputError(f"{path}: the prototype has motor1, motor2 and motor3, this eye has others; give a table")
-        driven = np.stack([step.motors[motor.name] for motor in eye_motors], axis=-1)
-        return Measured(step.name, step.time, driven, AXES, _angles(step.orientation), step.warnings)
-    table = table_of(path, lines, "t_s,tau2_deg,yaw_deg,pitch_deg,roll_deg")
-    if len(table.lines) < MIN_ROWS:
-        raise InputError(f"{path} has {len(table.lines)} rows of numbers; a recording needs at least {MIN_ROWS}")
-    time = table.rising_time()
-    motor = np.zeros((len(time), len(eye_motors)))
-    spoken = {} if rig is None else {m.name: m for m in rig.motors}
-    columns = {m.name: spoken[m.name].column if m.name in spoken else m.column for m in eye_motors}
-    for i, each in enumerate(eye_motors):
-        if columns[each.name] in table:
-            told = table[columns[each.name]]
-            motor[:, i] = spoken[each.name].from_driver(told) if each.name in spoken else told
-    if not np.ptp(motor, axis=0).any():
-        raise InputError(
-            f"{path}: no motor of this eye moves; its columns are {', '.join(columns.values())}, the file has "
-            f"{', '.join(table.columns)}"
-        )
-    if all(name in table for name in _QUATERNION):
-        quaternion = table.stack(_QUATERNION)
-        if (np.abs(np.linalg.norm(quaternion, axis=-1) - 1) > 0.01).any():
-            raise InputError(f"{path}: {', '.join(_QUATERNION)} must be unit quaternions, some are not")
-        return Measured(path.name, time, motor, AXES, _angles(quaternion))
-    axes = tuple(axis for axis in AXES if f"{axis}_deg" in table)
-    if not axes:
-        raise InputError(
-            f"{path} has no angle of the eye: no column yaw_deg, pitch_deg, roll_deg, or {', '.join(_QUATERNION)}; it "
-            f"has {', '.join(table.columns)}"
-        )
-    angles = np.stack([np.unwrap(table[f"{axis}_deg"], period=360.0) for axis in axes], axis=-1)
-    return Measured(path.name, time, motor, axes, angles)
-
-
-def _angles(orientation: Array) -> Array:
-    """Yaw, pitch, roll [deg] (..., time, 3) without jumps, of orientations (..., time, 4)."""
-    return np.unwrap(np.stack(to_euler(rotation(orientation).as_quat(scalar_first=True)), axis=-1), period=360, axis=-2)
 
 
 @dataclass(frozen=True)
@@ -187,6 +62,7 @@ class PhysicalFit:
         autocorrelation: lag-1, of the residuals.
         condition: number of the Jacobian with columns of unit length.
         held_out: each recording, predicted by a fit to the others; empty where there is one only.
+        residuals: predicted less measured angles [deg] of each recording, without their means, (rows, axes).
         warnings: for people.
     """
 
@@ -199,6 +75,7 @@ class PhysicalFit:
     autocorrelation: float
     condition: float
     held_out: tuple[HeldOut, ...]
+    residuals: tuple[Array, ...]
     warnings: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Estimate:
@@ -298,7 +175,7 @@ def fit_physical(
             f"the recordings have {problem.samples} angles; at least {needed} are needed: record more rows"
         )
     values = _search(sysid, problem, _beginning(sysid, problem, own))
-    values = np.array([float(f"{x:.{_DIGITS}g}") for x in values * problem.own]) / problem.own  # as in the file
+    values = np.array([float(f"{x:.{DIGITS}g}") for x in values * problem.own]) / problem.own  # as in the file
     held_out = []
     if len(recordings) > 1:
         for left_out in recordings:
@@ -309,6 +186,19 @@ def fit_physical(
             rms, power = float(np.sqrt(np.mean(error**2))), float(np.sum(spread**2))
             held_out.append(HeldOut(left_out.name, rms, 1 - float(error @ error) / power if power else float("nan")))
     return _judged(sysid, problem, values, tuple(held_out))
+
+
+def moved(fit: PhysicalFit, recordings: Sequence[Measured]) -> tuple[Array, Array]:
+    """How the fitted eye moves under the motors of recordings.
+
+    Returns:
+        Times from each first row on [s] (time,), and yaw, pitch, roll [deg] (recordings, time, 3).
+    """
+    own = parameters(fit.eye)
+    free = [e.parameter for e in fit.estimates]
+    problem = _Problem.of(fit.eye, own, free, recordings)
+    time, angles = problem.angles(np.array([[e.value / own[e.parameter]] for e in fit.estimates]))
+    return time, angles[0]
 
 
 def usually_frozen(own: dict[Parameter, float]) -> tuple[str, ...]:
@@ -410,6 +300,11 @@ class _Problem:
             For each recording (rows * axes, eyes), the angles one after the other; NaN where an eye diverged or
             finds no rest.
         """
+        time, angles = self.angles(values)
+        return [self._residual(r, time, angles[:, i]) for i, r in enumerate(self.recordings)]
+
+    def angles(self, values: Array) -> tuple[Array, Array]:
+        """Times from the first row on [s] (time,), and yaw, pitch, roll [deg] (eyes, recordings, time, 3)."""
         models = [self.eye_of(column) for column in values.T]
         starts = np.concatenate([self._starts(model) for model in models])
         count, steps = len(self.recordings), self.control.shape[1]
@@ -418,12 +313,12 @@ class _Problem:
         state, _ = rollout([m for m in models for _ in range(count)], data, starts, control)
         state = np.concatenate([starts[:, None], state], axis=1).reshape(len(models), count, steps + 1, -1)
         first = 1 + int(self.model.joint("eye").qposadr[0])  # time comes first
-        angles = _angles(state[..., first : first + 4])
+        angles = angles_of(state[..., first : first + 4])
         # After a divergence a rollout repeats its last state, time included.
         whole = (state[..., -1, 0] > (steps - 0.5) * self.model.opt.timestep) & np.isfinite(state[..., 0, :]).all(-1)
         angles[~whole] = np.nan
         time = self.model.opt.timestep * np.arange(steps + 1)
-        return [self._residual(r, time, angles[:, i]) for i, r in enumerate(self.recordings)]
+        return time, angles
 
     def _residual(self, recording: Measured, time: Array, angles: Array) -> Array:
         at, columns = recording.time - recording.time[0], []
@@ -519,7 +414,7 @@ def _judged(sysid: ModuleType, problem: _Problem, values: Array, held_out: tuple
         near = min(1e-3 * (p.high - p.low), 1e-2 * float(value))
         half_width = float(h) if norm > 0 and np.isfinite(h) else np.inf
         estimates.append(
-            Estimate(p, float(f"{value:.{_DIGITS}g}"), half_width, bool(min(value - p.low, p.high - value) < near))
+            Estimate(p, float(f"{value:.{DIGITS}g}"), half_width, bool(min(value - p.low, p.high - value) < near))
         )
     fit = PhysicalFit(
         eye=problem.eye,
@@ -531,6 +426,9 @@ def _judged(sysid: ModuleType, problem: _Problem, values: Array, held_out: tuple
         autocorrelation=correlation,
         condition=condition,
         held_out=held_out,
+        residuals=tuple(
+            part[:, 0].reshape(len(r.axes), -1).T for part, r in zip(parts, problem.recordings, strict=True)
+        ),
         warnings=(),
     )
     return replace(fit, warnings=tuple(_warnings(fit, problem.recordings)))
@@ -550,82 +448,3 @@ def _warnings(fit: PhysicalFit, recordings: Sequence[Measured]) -> Iterator[str]
         yield f"parameters cannot be told apart, {told}, so no interval means much: freeze one"
     if not fit.held_out:
         yield "one recording only: nothing is held out"
-
-
-def write_eye(fit: PhysicalFit, path: str | Path) -> list[str]:
-    """Write the fitted eye as an MJCF file that needs no other: its meshes stand in it.
-
-    MuJoCo writes 6 significant digits; those of the fitted parameters are what was fitted.
-
-    Returns:
-        Files that it still refers to, relative to those of the eye it was made from: textures, height fields.
-
-    Raises:
-        InputError: it cannot be written.
-    """
-    spec, values = load_spec(fit.eye), fit.values
-    for tendon in spec.tendons:
-        default = tendon.default()
-        group = "elastics" if default.name == "main" else default.name
-        for name, place, index in (("stiffness", "stiffness", 0), ("rest_length", "springlength", 1)):
-            if f"{name}_{group}" not in fit.frozen:
-                for changed in (default.tendon, tendon):  # in the class, so that the file says it once
-                    getattr(changed, place)[index] = values[f"{name}_{group}"]
-    if "friction" not in fit.frozen:
-        spec.joint("eye").damping[0] = values["friction"]
-    _inline_meshes(spec)
-    told = [f"{e.parameter.name} = {e} {e.parameter.unit} (95 %)" for e in fit.estimates]
-    told += [f"{name} = {value:.6g}, kept" for name, value in fit.frozen.items()]
-    comment = f"Eye {Path(fit.eye).name}, fitted to recordings by orient-eye sysid: " + "; ".join(told) + "."
-    xml = spec.to_xml()
-    write_text(path, f"<!-- {comment.replace('--', '- -')} -->\n{xml}")
-    files = (element.get("file") for element in ElementTree.fromstring(xml).iter() if element.tag != "compiler")
-    return sorted({file for file in files if file})
-
-
-def _inline_meshes(spec: mujoco.MjSpec) -> None:
-    """Meshes of files as numbers in the MJCF."""
-    model = spec.copy().compile()
-    for mesh in spec.meshes:
-        if not mesh.file:
-            continue
-        i = model.mesh(mesh.name).id
-        corner, face = model.mesh_vertadr[i], model.mesh_faceadr[i]
-        corners = model.mesh_vert[corner : corner + model.mesh_vertnum[i]]
-        # The compiler puts a mesh into its own frame, scaled.
-        placed = rotation(model.mesh_quat[i]).apply(corners) + model.mesh_pos[i]
-        mesh.file, mesh.content_type, mesh.scale = "", "", [1, 1, 1]
-        mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
-        mesh.uservert = placed.ravel().tolist()
-        mesh.userface = model.mesh_face[face : face + model.mesh_facenum[i]].ravel().tolist()
-
-
-def summary(fit: PhysicalFit) -> dict[str, Any]:
-    """The fit as plain values, for JSON, without NaN or infinity."""
-
-    def finite(value: float) -> float | None:
-        return float(value) if np.isfinite(value) else None
-
-    return {
-        "eye": fit.eye,
-        "fitted": {
-            e.parameter.name: {
-                "value": e.value,
-                "interval": [finite(x) for x in e.interval],
-                "unit": e.parameter.unit,
-                "bounds": [e.parameter.low, e.parameter.high],
-                "at_bound": e.at_bound,
-                "undetermined": e.parameter.name in fit.undetermined,
-            }
-            for e in fit.estimates
-        },
-        "frozen": fit.frozen,
-        "rms_deg": fit.rms_deg,
-        "samples": fit.samples,
-        "effective_samples": fit.effective_samples,
-        "autocorrelation": fit.autocorrelation,
-        "condition": finite(fit.condition),
-        "held_out": [{"name": h.name, "rms_deg": h.rms_deg, "r_squared": finite(h.r_squared)} for h in fit.held_out],
-        "held_out_rms_deg": finite(fit.held_out_rms_deg),
-        "warnings": list(fit.warnings),
-    }

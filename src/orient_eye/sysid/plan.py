@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 SHARES = (0.15, 0.3, 0.5)
 """Amplitudes of the steps, of the way from rest to the nearer end of the range; each in both directions."""
 REST_S, HOLD_S = 0.5, 2.0
-"""Before a step, and after it: longer than an eye takes to settle."""
+"""Before a step, and after the longest at least: longer than an eye takes to settle."""
 _BACK_DEG_S = 20.0  # slow: no eye is thrown about
 _OF_LIMIT = 0.9  # so that the motor can follow
 _MIDDLE = 0.8  # of the range: outside it 0 deg is too near an end to step from
@@ -37,7 +37,7 @@ class PlannedStep:
         amplitude_deg: of the drive, from rest.
         time: [s], at the driver's rate, (rows,).
         drive: position [deg], (rows,).
-        until_s: when the hold ends.
+        until_s: when the hold ends; the same of all, so that one time cuts every recording.
     """
 
     name: str
@@ -51,7 +51,7 @@ def plan_steps(rig: Rig, axis: str) -> tuple[PlannedStep, ...]:
     """Steps of three amplitudes in both directions.
 
     Each rests, steps as fast as nine tenths of the drive's limits let it (in one row where no speed limit is known),
-    holds, and goes back slowly.
+    holds until the same time, and goes back slowly.
 
     Raises:
         InputError: the rig does not turn the axis, or its range is not known.
@@ -66,29 +66,32 @@ def plan_steps(rig: Rig, axis: str) -> tuple[PlannedStep, ...]:
     middle, half = (low + high) / 2, (high - low) / 2
     rest = 0.0 if abs(middle) <= _MIDDLE * half else middle
     room = min(high - rest, rest - low)
-    steps = []
-    for share in SHARES:
+    steps, step_s = [], 1 / rig.command_rate_hz
+    sizes = [float(f"{share * room:.2g}") for share in SHARES]
+    stands = max(len(_rise(motor, size, step_s)) for size in sizes) + round(HOLD_S / step_s)  # rows from the step on
+    for size in sizes:
         for sign in (1, -1):
-            amplitude = sign * float(f"{share * room:.2g}")
-            time, drive, until = _path(motor, rest, amplitude, 1 / rig.command_rate_hz)
-            name = f"step_{'plus' if sign > 0 else 'minus'}_{abs(amplitude):g}"
-            steps.append(PlannedStep(name, amplitude, time, drive, until))
+            time, drive = _path(motor, rest, sign * size, step_s, stands)
+            until = step_s * (round(REST_S / step_s) + stands)
+            steps.append(
+                PlannedStep(f"step_{'plus' if sign > 0 else 'minus'}_{size:g}", sign * size, time, drive, until)
+            )
     return tuple(steps)
 
 
-def _path(motor: Motor, rest: float, amplitude: float, step_s: float) -> tuple[Array, Array, float]:
-    """Times, positions of the drive, and when the hold ends."""
+def _path(motor: Motor, rest: float, amplitude: float, step_s: float, stands: int) -> tuple[Array, Array]:
+    """Times and positions of the drive, which steps and holds over as many rows as it `stands`."""
     way = _rise(motor, abs(amplitude), step_s)
     back_deg_s = min(_BACK_DEG_S, _OF_LIMIT * (motor.speed_limit or np.inf))
     seconds = np.pi / 2 * abs(amplitude) / back_deg_s
     if motor.acceleration_limit:
         seconds = max(seconds, np.pi * np.sqrt(abs(amplitude) / (2 * _OF_LIMIT * motor.acceleration_limit)))
     back = (1 + np.cos(np.pi * np.linspace(0, 1, int(np.ceil(seconds / step_s)) + 1))) / 2 * abs(amplitude)
-    resting, holding = round(REST_S / step_s), round(HOLD_S / step_s)
+    resting, holding = round(REST_S / step_s), stands - len(way)
     parts = [np.zeros(resting), way, np.full(holding, abs(amplitude)), back, np.zeros(resting)]
     drive = rest + np.sign(amplitude) * np.concatenate(parts)
     time = step_s * np.arange(len(drive), dtype=float)
-    return time, np.asarray(drive, float), step_s * (resting + len(way) + holding)
+    return time, np.asarray(drive, float)
 
 
 def _rise(motor: Motor, size: float, step_s: float) -> Array:
@@ -137,7 +140,7 @@ def how_to_record(steps: Sequence[PlannedStep], rig: Rig, axis: str) -> str:
     motor = rig.drive(axis)
     columns = ", ".join(rig.motor(name).column for name in rig.axes[axis])
     tables = ", ".join(f"`{s.name}.csv`" for s in steps)
-    until = max(s.until_s for s in steps)
+    until = min(s.until_s for s in steps)
     names = " ".join(f"recorded/{s.name}.csv" for s in steps)
     known = (("speed", motor.speed_limit, "deg/s"), ("acceleration", motor.acceleration_limit, "deg/s²"))
     limits = [f"{name} up to {value:g} {unit}" for name, value, unit in known if value]
@@ -162,8 +165,8 @@ For each table:
    - `{axis}_deg`, the angle of the eye, deg; or its orientation, `q_w, q_x, q_y, q_z`.
 4. Save it as a table of its own (commas between cells, the names above in the first line).
 
-The first half second is rest, and is needed: movements are measured from it. After {until:.2f} s the way back begins,
+The first half second is rest, and is needed: movements are measured from it. After {until:.3f} s the way back begins,
 which `--until` leaves out:
 
-    orient-eye sysid --rig RIG.toml --axis {axis} --until {until:.2f} --recording {names}
+    orient-eye sysid --rig RIG.toml --axis {axis} --until {until:.3f} --recording {names}
 """

@@ -138,7 +138,8 @@ class PulseStepActions(ActionSpace):
         pulse: a name of `orient_eye.commands.pulses.PULSES`.
         C: onset rate [1/s] of a pulse that has one; None for the thesis' fixed value, "varying" for the one that
             brings the motor to the speed limit.
-        speed_limit: V [deg/s], for a varying C.
+        speed_limit: V [deg/s], for a varying C; None for that of the slowest driven motor, or the thesis' 7200 where
+            none is limited.
 
     Raises:
         InputError: motors the plant has not, an unknown pulse, a C that is none, or a speed limit that is none.
@@ -152,10 +153,14 @@ class PulseStepActions(ActionSpace):
         driven: Sequence[str],
         pulse: str = "1",
         C: float | str | None = None,
-        speed_limit: float = SPEED_LIMIT,
+        speed_limit: float | None = None,
     ) -> None:
-        self.plant, self.driven, self.pulse, self.speed_limit = plant, tuple(driven), pulse, speed_limit
+        self.plant, self.driven, self.pulse = plant, tuple(driven), pulse
         self.index = check_driven(plant.motors, self.driven, plant.name)
+        if speed_limit is None:
+            known = (plant.motors[i].speed_limit for i in self.index)
+            speed_limit = min((limit for limit in known if limit), default=SPEED_LIMIT)
+        self.speed_limit = speed_limit
         onset = PULSES[pulse].onset
         if isinstance(C, str) and C != "varying":
             raise InputError(f"C is a number [1/s], 'varying' or nothing, got {C!r}")

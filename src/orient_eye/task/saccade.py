@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.commands import Command
-from orient_eye.constants import BAND, HORIZON_S, SPEED_LIMIT
+from orient_eye.constants import BAND, HORIZON_S
 from orient_eye.errors import InputError
 from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures
@@ -107,7 +107,7 @@ class SaccadeTask:
         judge: str | None = None,
         actions: str = "pulse-step",
         band: float = BAND,
-        speed_limit: float = SPEED_LIMIT,
+        speed_limit: float | None = None,
         horizon_s: float | None = None,
     ) -> "SaccadeTask":
         """A learning case on a plant.
@@ -123,7 +123,7 @@ class SaccadeTask:
             judge: a name of `orient_eye.task.judge.JUDGES`; None for that of the targets.
             actions: a name of `orient_eye.task.actions.ACTIONS`.
             band: settling band, share of the amplitude.
-            speed_limit: V [deg/s], for a varying C.
+            speed_limit: V [deg/s], for a varying C; None for the motors' own.
             horizon_s: of a simulated saccade; None for the plant's own.
 
         Raises:
