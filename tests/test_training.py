@@ -208,7 +208,7 @@ def test_failed_saccades_stop_nothing_and_are_counted(tmp_path: Path, monkeypatc
 
     def failing(task: SaccadeTask, start: State, action: np.ndarray, target: np.ndarray, *random: Any) -> Outcome:
         outcome = perform(task, start, action, target, *random)
-        if len(action) != TINY.saccades_per_update:
+        if len(action) != 64:
             return outcome  # of the evaluation
         measures = replace(outcome.measures, failed=np.arange(len(action)) % 3 == 0)
         worst = JUDGES[task.judge].reward(outcome.movement, measures, target, task.weights)
@@ -216,7 +216,8 @@ def test_failed_saccades_stop_nothing_and_are_counted(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(SaccadeTask, "perform", failing)
     result = train(TINY, tmp_path / "run", quiet=True)
-    assert result["failed_saccades"] == 6 * (TINY.warmup // 16 + 60)
+    rollouts = TINY.warmup // 64 + 60 // 4  # of 64 saccades, for four updates each: 8 do not divide the 60
+    assert result["failed_saccades"] == 22 * rollouts
     assert _metrics(tmp_path / "run")[-1].endswith(f",{result['failed_saccades']}")
 
 

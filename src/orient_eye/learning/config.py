@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from orient_eye.constants import BAND, SPEED_LIMIT
+from orient_eye.constants import BAND
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,31 +27,34 @@ def _default(words: str) -> Any:
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "ours": {
-        "updates": 14_000,
-        "batch_size": 1024,
-        "replay_size": 300_000,
-        "warmup": 2048,
-        "learning_rate": 1e-3,
+        "updates": 8_000,
+        "updates_per_rollout": 8,
+        "batch_size": 512,
+        "replay_size": 60_000,
+        "warmup": 4096,
+        "learning_rate": 3e-3,
         "last_learning_rate": 0.03,
-        "temperature": (1.0, 1e-3),
+        "second_moment": 0.98,
+        "temperature": (0.1, 1e-3),
         "reward_scale": "log",
     },
     "thesis": {  # 4.6; it says nothing of the temperature
         "updates": 300_000,
+        "updates_per_rollout": 1,
         "saccades_per_update": 1,
         "batch_size": 8196,
         "replay_size": 30_000,
         "warmup": 8196,
         "learning_rate": 1e-5,
         "last_learning_rate": 1.0,
+        "second_moment": 0.999,
         "temperature": "auto",
         "reward_scale": "raw",
     },
 }
-_LIMITED = {"updates": 5_000, "saccades_per_update": 64, "evaluation_pairs": 30}
-"""Of ours, on a rig whose motor's limits are simulated: minutes on two cores (docs/learning.md)."""
 _LARGEST = {
     "updates": 10**9,
+    "updates_per_rollout": 10**4,
     "saccades_per_update": 10**5,
     "batch_size": 10**6,
     "replay_size": 10**8,
@@ -74,7 +77,7 @@ class TrainConfig:
     """Set of targets between which saccades are made."""
     driven: Annotated[tuple[str, ...] | None, _default("those that the targets need")] = None
     """Motors that the policy commands; the others stay where they are."""
-    speed_limit: float = SPEED_LIMIT
+    speed_limit: Annotated[float | None, _default("that of the slowest driven motor, else 7200")] = None
     """Motor speed to which a varying C brings the command, in deg/s."""
     weights: Annotated[
         tuple[float, ...] | dict[str, float] | None,
@@ -93,23 +96,25 @@ class TrainConfig:
     """How long a simulated saccade lasts, in s."""
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
-    updates: Annotated[int | None, _default("14000, 5000 on a rig; thesis 300000")] = None
+    updates: Annotated[int | None, _default("8000; thesis 300000")] = None
     """How many times the networks are updated."""
-    saccades_per_update: Annotated[int | None, _default("128 in closed form, 64 on a rig, 32 simulated; thesis 1")] = (
-        None
-    )
-    """Fresh saccades performed before each update."""
-    batch_size: Annotated[int | None, _default("1024; thesis 8196")] = None
+    saccades_per_update: Annotated[int | None, _default("64, 32 simulated; thesis 1")] = None
+    """Fresh saccades performed for each update."""
+    updates_per_rollout: Annotated[int | None, _default("8, or what divides the updates; thesis 1")] = None
+    """Updates between two rollouts: a rollout performs the saccades of that many updates in one batch."""
+    batch_size: Annotated[int | None, _default("512; thesis 8196")] = None
     """Saccades that one update learns from."""
-    replay_size: Annotated[int | None, _default("300000; thesis 30000")] = None
+    replay_size: Annotated[int | None, _default("60000; thesis 30000")] = None
     """Saccades that the replay buffer holds."""
-    warmup: Annotated[int | None, _default("2048; thesis 8196")] = None
+    warmup: Annotated[int | None, _default("4096; thesis 8196")] = None
     """Saccades with random actions before the first update."""
-    learning_rate: Annotated[float | None, _default("0.001; thesis 0.00001")] = None
+    learning_rate: Annotated[float | None, _default("0.003; thesis 0.00001")] = None
     """Learning rate of the optimiser (Adam)."""
     last_learning_rate: Annotated[float | None, _default("0.03; thesis 1")] = None
-    """Share of the learning rate that is left at the end; it falls linearly over the last fifth of the run."""
-    temperature: Annotated[tuple[float, float] | Literal["auto"] | None, _default("1 0.001; thesis auto")] = None
+    """Share of the learning rate that is left at the end; it falls linearly over the last 60 % of the run."""
+    second_moment: Annotated[float | None, _default("0.98; thesis 0.999")] = None
+    """Adam's decay of its mean of squared gradients: how long a large gradient is remembered."""
+    temperature: Annotated[tuple[float, float] | Literal["auto"] | None, _default("0.1 0.001; thesis auto")] = None
     """Entropy temperature at the beginning and at the end; it falls geometrically over the first 80 % of the run.
     With auto it follows the automatic rule of Stable-Baselines3."""
     reward_scale: Annotated[Literal["log", "raw"] | None, _default("log; thesis raw")] = None
@@ -171,9 +176,11 @@ class TrainConfig:
         values: dict[str, Any] = {
             "saccades_per_update": task.plant.pace.saccades_per_update,
             "evaluation_pairs": task.plant.pace.evaluation_pairs,
-            **(_PRESETS[self.preset] | (_LIMITED if self.preset == "ours" and _limited(task) else {})),
+            **_PRESETS[self.preset],
             **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},
         }
+        if self.updates_per_rollout is None and _whole(values["updates"]):
+            values["updates_per_rollout"] = math.gcd(values["updates"], values["updates_per_rollout"])
         values["robust"] = _intervals(task) if self.robust else {}
         return TrainSettings(task=task.identity(), weights_from=task.weights_from, **values)
 
@@ -198,12 +205,14 @@ class TrainSettings:
     weights_from: str
     case: str
     updates: int
+    updates_per_rollout: int
     saccades_per_update: int
     batch_size: int
     replay_size: int
     warmup: int
     learning_rate: float
     last_learning_rate: float
+    second_moment: float
     temperature: tuple[float, float] | Literal["auto"]
     reward_scale: Literal["log", "raw"]
     device: str
@@ -215,6 +224,10 @@ class TrainSettings:
         for name, largest in _LARGEST.items():
             value = getattr(self, name)
             _require(_whole(value) and 1 <= value <= largest, name, f"a whole number from 1 to {largest}", value)
+        words = f"a number that divides the {self.updates} updates"
+        _require(self.updates % self.updates_per_rollout == 0, "updates_per_rollout", words, self.updates_per_rollout)
+        moment = self.second_moment
+        _require(_positive(moment) and moment < 1, "second_moment", "a number between 0 and 1", moment)
         _require(_positive(self.learning_rate), "learning_rate", "positive and finite", self.learning_rate)
         share = self.last_learning_rate
         _require(_positive(share) and share <= 1, "last_learning_rate", "a share above 0, at most 1", share)
@@ -230,6 +243,11 @@ class TrainSettings:
         _require(self.reward_scale in ("log", "raw"), "reward_scale", "log or raw", self.reward_scale)
         _require(_whole(self.seed) and self.seed >= 0, "seed", "a whole number, not negative", self.seed)
         _check_device(self.device)
+
+    @property
+    def saccades_per_rollout(self) -> int:
+        """Saccades performed in one batch."""
+        return self.saccades_per_update * self.updates_per_rollout
 
     def make_task(self) -> "SaccadeTask":
         """The task again, as it was."""
@@ -248,11 +266,6 @@ class TrainSettings:
             return cls(**content)
         except TypeError as error:
             raise InputError(f"these settings are not of this version of orient-eye: {error}") from error
-
-
-def _limited(task: "SaccadeTask") -> bool:
-    """Whether it is a rig, with bounds of its own, that takes a horizon because its motor is simulated."""
-    return task.plant.pulse_rates is not None and task.plant.horizon_s is not None
 
 
 def _intervals(task: "SaccadeTask") -> dict[str, tuple[float, float]]:

@@ -15,6 +15,7 @@ from orient_eye.environments.sb3_env import SaccadeVecEnv
 from orient_eye.errors import InputError
 from orient_eye.files import write_table
 from orient_eye.learning.checkpoint import save_checkpoint
+from orient_eye.learning.config import TrainSettings
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.sac import OneStepSAC
 from orient_eye.progress import Advance
@@ -38,7 +39,7 @@ class TrainingLoop(BaseCallback):
         self,
         folder: Path,
         env: SaccadeVecEnv,
-        updates: int,
+        settings: TrainSettings,
         yardstick: Yardstick,
         table: Yardstick,
         advance: Advance,
@@ -48,8 +49,9 @@ class TrainingLoop(BaseCallback):
         super().__init__()
         self.checkpoint_s = checkpoint_s
         self.folder, self.env, self.yardstick, self.table, self.request = folder, env, yardstick, table, request
-        self.updates, self.advance = updates, advance
-        self.every = max(1, self.updates // _EVALUATIONS)
+        self.updates, self.advance = settings.updates, advance
+        rollouts = settings.updates // settings.updates_per_rollout
+        self.every = max(1, rollouts // _EVALUATIONS) * settings.updates_per_rollout
         self.rows: list[dict[str, float]] = []
         self.rewards: list[float] = []
         self.failed, self.elapsed = 0, 0.0
@@ -88,7 +90,7 @@ class TrainingLoop(BaseCallback):
             )
         if n % self.every == 0 and n != self.evaluated:
             self._evaluate(n)
-        if n % 10 == 0 and self.rows:
+        if self.rows:
             speed = (n - self.done_before) / max(time.monotonic() - self.resumed, 1e-9)
             row = self.rows[-1]
             note = f"reward {row['reward_mean']:.3g}  gap {100 * row['gap_mean']:.2f} %  {speed:.0f} updates/s"

@@ -37,6 +37,7 @@ from orient_eye.task.known_weights import bounds, compared_with_thesis
 from orient_eye.task.saccade import SaccadeTask
 
 _NETS = [128, 128, 32]  # thesis 4.6
+_FALLING = 0.6  # of the run, at its end, in which the learning rate falls
 
 
 class Interrupted(Exception):
@@ -146,10 +147,11 @@ class _Run:
         model.action_space.seed(actions)
         yardstick, table = self._yardsticks()
         with StopRequest() as request, progress_bar("training", quiet=self.quiet) as advance:
-            loop = TrainingLoop(folder, env, settings.updates, yardstick, table, advance, request, self.checkpoint_s)
+            loop = TrainingLoop(folder, env, settings, yardstick, table, advance, request, self.checkpoint_s)
             if resume:
                 loop.go_on(load_checkpoint(folder, model, env))
-            total = (self._warmup_steps() + settings.updates) * env.num_envs
+            rollouts = self._warmup_steps() + settings.updates // settings.updates_per_rollout
+            total = rollouts * env.num_envs
             try:
                 left = total - model.num_timesteps
                 model.learn(left, callback=loop, log_interval=10**9, reset_num_timesteps=not resume)
@@ -160,14 +162,14 @@ class _Run:
         return self._conclude(model, yardstick, table, loop)
 
     def _warmup_steps(self) -> int:
-        return -(-self.settings.warmup // self.settings.saccades_per_update)
+        return -(-self.settings.warmup // self.settings.saccades_per_rollout)
 
     def _env(self) -> SaccadeVecEnv:
         settings, task = self.settings, self.task
         if settings.robust:  # each saccade on another eye, drawn from the environment's generator
             task = replace(task, plant=uncertain(task.plant, settings.robust))
         log = settings.reward_scale == "log"
-        return SaccadeVecEnv(settings.saccades_per_update, task, log_reward=log, infos=False)
+        return SaccadeVecEnv(settings.saccades_per_rollout, task, log_reward=log, infos=False)
 
     def _model(self, env: SaccadeVecEnv, *, seed: int, buffer_seed: int) -> OneStepSAC:
         settings = self.settings
@@ -176,21 +178,21 @@ class _Run:
             "MlpPolicy",
             env,
             temperature=None if temperature == "auto" else falling_temperature(*temperature),
-            learning_rate=lambda remaining: rate * max(min(remaining / 0.2, 1.0), last),
+            learning_rate=lambda remaining: rate * max(min(remaining / _FALLING, 1.0), last),
             batch_size=settings.batch_size,
             buffer_size=settings.replay_size,
             replay_buffer_class=OneStepReplayBuffer,
             replay_buffer_kwargs={"seed": buffer_seed},
             learning_starts=self._warmup_steps() * env.num_envs,
             train_freq=1,
-            gradient_steps=1,
+            gradient_steps=settings.updates_per_rollout,
             seed=seed,
             device=settings.device,
             policy_kwargs={
                 "net_arch": _NETS,
                 "features_extractor_class": GazeFeatures,
                 "n_critics": 1,
-                "optimizer_kwargs": {"fused": True},
+                "optimizer_kwargs": {"fused": True, "betas": (0.9, settings.second_moment)},
             },
         )
         model.set_logger(Logger(folder=None, output_formats=[]))

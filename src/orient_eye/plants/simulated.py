@@ -13,7 +13,7 @@ from orient_eye.errors import InputError
 from orient_eye.motor import Motor, names, ranges
 from orient_eye.movement import Movement, SampledMovement, energy_of
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.plants import SIMULATED, Pace, PulseRates
+from orient_eye.plants import SIMULATED, Pace, Plant, PulseRates
 from orient_eye.plants.limited_motor import follow
 from orient_eye.rotations import FORWARD
 from orient_eye.state import State
@@ -121,6 +121,10 @@ class SimulatedPlant(ABC):
     def identity(self) -> dict[str, Any]:
         """See `orient_eye.plants.Plant`."""
 
+    def twin(self) -> "Plant | None":
+        """No other plant is this one."""
+        return None
+
     def drawn(self) -> "mujoco.MjModel":
         """A ball without tendons: this plant has no model of its own."""
         from orient_eye.eyes.model import ball
@@ -171,7 +175,7 @@ class SimulatedPlant(ABC):
         """
         told = command.sample(self.step_s, self.samples(command, horizon_s))
         held, saturated = self._within_range(command, told)
-        failed = np.asarray(~np.isfinite(told).reshape(len(told), -1).all(axis=1))
+        failed = np.asarray(~np.isfinite(told).all(axis=(1, 2)))
         held = np.where(failed[:, None, None], 0.0, held)
         if start is None:
             start = State(self.rest(held[:, 0]), held[:, 0])
