@@ -60,7 +60,9 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
     From the chord between the quaternions, so that small angles keep full precision.
     """
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    chord = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    near = np.where(np.einsum("...k,...k", a, b) < 0, -1.0, 1.0)[..., None]
+    apart = a - near * b
+    chord = np.sqrt(np.einsum("...k,...k", apart, apart))
     return np.rad2deg(4 * np.arcsin(np.clip(chord / 2, 0, 1)))
 
 

@@ -53,29 +53,18 @@ class ExponentialSum:
                 terms.append(Term(x.c * x.n, x.n - 1, x.p))
         return ExponentialSum(tuple(terms))
 
-    def integral(self, t: Array) -> Array:
-        """Integral from 0 to t."""
-        parts = (x.c[..., None] * t ** (x.n + 1) * _moment(x.n, x.p[..., None] * t) for x in self.terms)
-        return sum(parts, np.zeros(()))
-
-    def low_pass(self, w: Array | float, t: Array) -> Array:
-        """Response at t, from rest, of the low-pass w / (s + w) to this sum.
-
-        Each term gives w exp(-w t) times the integral of c s^n exp(-(p - w) s) over 0..t, which has
-        no singularity at p = w; written so that neither sign of p - w overflows.
-        """
-        w = np.asarray(w, dtype=float)[..., None]
-        total = np.zeros(())
+    def with_integral(self, t: Array) -> tuple[Array, Array]:
+        """Value at times t (..., time), and the integral from 0 to t, exact to rounding of its limit."""
+        value = integral = np.zeros(())
         for x in self.terms:
-            p = x.p[..., None]
-            gap = (p - w) * t
-            slower = np.exp(-np.minimum(p, w) * t)
-            mirrored = gap < 0
-            moment = _moment(x.n, np.abs(gap))
-            if mirrored.any():
-                moment = np.where(mirrored, _mirrored_moment(x.n, np.abs(gap)), moment)
-            total = total + x.c[..., None] * w * t ** (x.n + 1) * slower * moment
-        return total
+            c, z = x.c[..., None], x.p[..., None] * t
+            decay = np.exp(-z)
+            value = value + c * t**x.n * decay
+            series = np.ones_like(z)  # sum of z^k / k! up to n
+            for k in range(x.n, 0, -1):
+                series = 1 + series * z / k
+            integral = integral + factorial(x.n) * c / x.p[..., None] ** (x.n + 1) * (1 - series * decay)
+        return value, integral
 
     def through(self, poles: Sequence[complex | Numbers]) -> "Modes":
         """Response, from rest, of the system with these poles and static gain 1 to this sum; see `Modes.through`."""
@@ -286,41 +275,3 @@ def filter_energy(poles: Sequence[Array], zero: Array) -> Array:
         return (p * q + zero**2) / (2 * p * q * (p + q))
     p, q, r = poles
     return (p * q * r + zero**2 * (p + q + r)) / (2 * p * q * r * (p + q) * (p + r) * (q + r))
-
-
-def _moment(n: int, z: Array) -> Array:
-    """Integral of u^n exp(-z u) over 0..1, for z >= 0."""
-    small = z < _SMALL
-    safe = np.where(small, 1.0, z)
-    decay = np.exp(-safe)
-    value = -np.expm1(-safe) / safe
-    for k in range(1, n + 1):
-        value = (k * value - decay) / safe
-    return _with_series(value, small, z, [1 / (n + k + 1) for k in range(_SERIES)])
-
-
-def _mirrored_moment(n: int, z: Array) -> Array:
-    """Integral of (1 - u)^n exp(-z u) over 0..1, for z >= 0."""
-    small = z < _SMALL
-    safe = np.where(small, 1.0, z)
-    value = -np.expm1(-safe) / safe
-    for k in range(1, n + 1):
-        value = (1 - k * value) / safe
-    # The integral of (1 - u)^n u^k is n! k! / (n + k + 1)!.
-    beta = [factorial(n) * factorial(k) / factorial(n + k + 1) for k in range(_SERIES)]
-    return _with_series(value, small, z, beta)
-
-
-_SMALL = 0.5  # above it the recursion over n loses at most two digits for n <= 2
-_SERIES = 14  # terms of the power series: the next is below 1e-16 for z up to 0.5
-
-
-def _with_series(value: Array, small: NDArray[np.bool_], z: Array, moments: list[float]) -> Array:
-    """`value`, replaced where z is small by the series of (-z)^k / k! times the k-th moment."""
-    if small.any():
-        x = z[small]
-        total = np.zeros_like(x)
-        for k in reversed(range(len(moments))):
-            total = total * -x / (k + 1) + moments[k]
-        value[small] = total
-    return value

@@ -105,8 +105,13 @@ class PulseStep:
     def position(self, t: ArrayLike) -> Array:
         """Motor positions tau(t) = F + p + k0 times the integral of p [deg], (saccades, time, motors)."""
         times = _times(t)
-        moved = self.shape(times) + self.k0[..., None] * self.shape.integral(times)
-        return self._by_time(self.F[..., None] + self.step[..., None] * moved)
+        at = np.repeat(self.F[..., None], times.size, axis=-1)
+        told = self.step.any(axis=0)  # of an eye with several motors often one
+        if told.any():
+            shape, k0, step = self.kind.shape(*(x[:, told] for x in (self.B, self.k0, self.C))), self.k0, self.step
+            pulse, integral = shape.with_integral(times)
+            at[:, told] += step[:, told, None] * (pulse + k0[:, told, None] * integral)
+        return self._by_time(at)
 
     def rate(self, t: ArrayLike) -> Array:
         """Motor speeds d tau/dt = p' + k0 p [deg/s], (saccades, time, motors)."""
