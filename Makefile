@@ -13,7 +13,7 @@ help:
 	@echo "make test   install and run all tests, with coverage of lines and branches; make test COVERAGE= is faster"
 	@echo "make check  ruff and the type checker"
 	@echo "make rigs   thirty simulated rigs, from their recorded steps to a command that they perform (an hour)"
-	@echo "make bench  speed of the plants and of the learning, as ratios"
+	@echo "make bench  speed of the plants and of the learning, start-up, and how cost grows (ten minutes)"
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -45,7 +45,9 @@ rigs: $(INSTALLED)
 bench: $(INSTALLED)
 	$(BIN)/python benchmarks/plants.py
 	$(BIN)/python benchmarks/learning.py
+	$(BIN)/python benchmarks/learning.py --profile
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/growth.py
 
 clean:
 	rm -rf $(VENV) $(DEMO) .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -25,20 +25,56 @@ quaternions w, x, y, z from eye to head coordinates. `InputError` says what was 
 | a rig | `identify_plant`, `identify_recordings`, `read_recordings`, `Surrogate` |
 | a picture | `record` (Rerun), `frames`, `write_film` |
 
-Names are loaded when they are first used: importing orient_eye loads neither MuJoCo nor torch.
+Names are loaded when they are first used: importing orient_eye loads neither NumPy, MuJoCo nor torch.
 """
 
+import sys
 from importlib import metadata
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
 
-import gymnasium
 import lazy_loader
 
 __version__ = metadata.version("orient-eye")
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names stand in __init__.pyi
 
-gymnasium.register(
-    id="OrientEye/Saccade-v0",
-    entry_point="orient_eye.environments.saccade_env:SaccadeEnv",
-    vector_entry_point="orient_eye.environments.vector_env:SaccadeVectorEnv",
-)
+
+def _register() -> None:
+    import gymnasium
+
+    gymnasium.register(
+        id="OrientEye/Saccade-v0",
+        entry_point="orient_eye.environments.saccade_env:SaccadeEnv",
+        vector_entry_point="orient_eye.environments.vector_env:SaccadeVectorEnv",
+    )
+
+
+class _OnceImported(MetaPathFinder):
+    """Registers the environment when somebody imports gymnasium, for whose import --help need not wait."""
+
+    def find_spec(self, fullname: str, path: Any = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        if fullname != "gymnasium":
+            return None
+        others = (finder.find_spec(fullname, path, target) for finder in sys.meta_path if finder is not self)
+        spec = next((found for found in others if found is not None), None)
+        if spec is None or spec.loader is None:
+            return None
+        loader, execute = spec.loader, spec.loader.exec_module
+
+        def and_register(module: ModuleType) -> None:
+            execute(module)
+            sys.meta_path.remove(self)
+            loader.__dict__.pop("exec_module")
+            _register()
+
+        vars(loader)["exec_module"] = and_register
+        return spec
+
+
+if "gymnasium" in sys.modules:
+    _register()
+else:
+    sys.meta_path.insert(0, _OnceImported())

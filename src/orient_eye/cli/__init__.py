@@ -64,7 +64,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(arguments: list[str], *, as_json: bool) -> int:
     """Run a command line; returns the exit code."""
-    from orient_eye.cli.options import parse
     from orient_eye.cli.tables import say
 
     if "--version" in arguments:
@@ -75,6 +74,8 @@ def _run(arguments: list[str], *, as_json: bool) -> int:
     try:
         if not arguments or arguments[0] not in COMMANDS:
             return _list_commands(arguments)
+        from orient_eye.cli.options import parse
+
         result = parse(_command(arguments[0]), arguments[1:], program=f"orient-eye {arguments[0]}").run()
     except InputError as error:
         say(f"error: {error}", style="red")

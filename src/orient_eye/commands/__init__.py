@@ -7,15 +7,18 @@
 A command covers all motors of a plant; one that is not to move is told its rest position throughout.
 """
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
 
 from orient_eye.errors import InputError
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:  # the names of pulses are listed without NumPy
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
 
 class Command(Protocol):
@@ -78,6 +81,8 @@ class Sampled:
     saturates: bool = False
 
     def __post_init__(self) -> None:
+        import numpy as np
+
         try:
             positions = np.asarray(self.positions, dtype=float)
         except (TypeError, ValueError) as error:
@@ -96,6 +101,8 @@ class Sampled:
 
     def sample(self, step_s: float, samples: int) -> Array:
         """See `Command.sample`; at the command's own interval the positions as they are."""
+        import numpy as np
+
         own = self.positions.shape[1]
         if step_s == self.step_s:
             held = np.minimum(np.arange(samples), own - 1)
@@ -118,11 +125,15 @@ class Sampled:
     @property
     def too_fast(self) -> NDArray[np.bool_]:
         """Nothing was to be kept."""
+        import numpy as np
+
         return np.zeros(len(self), bool)
 
 
 def path_energy(positions: Array, step_s: float) -> Array:
     """Integral of the squared speeds along straight lines between positions (saccades, time, motors), (saccades,)."""
+    import numpy as np
+
     return np.asarray((np.diff(positions, axis=1) ** 2).sum(axis=(1, 2)) / step_s)
 
 

@@ -108,9 +108,9 @@ class PulseStep:
         at = np.repeat(self.F[..., None], times.size, axis=-1)
         told = self.step.any(axis=0)  # of an eye with several motors often one
         if told.any():
-            shape, k0, step = self.kind.shape(*(x[:, told] for x in (self.B, self.k0, self.C))), self.k0, self.step
-            pulse, integral = shape.with_integral(times)
-            at[:, told] += step[:, told, None] * (pulse + k0[:, told, None] * integral)
+            B, k0, C, step = (np.asarray(x)[:, told] for x in (self.B, self.k0, self.C, self.step))
+            pulse, integral = self.kind.shape(B, k0, C).with_integral(times)
+            at[:, told] += step[..., None] * (pulse + k0[..., None] * integral)
         return self._by_time(at)
 
     def rate(self, t: ArrayLike) -> Array:

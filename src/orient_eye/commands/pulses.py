@@ -8,18 +8,22 @@ Symbols of the thesis: B decay of the pulse [1/s], k0 gain of the integrator [1/
 [1/s], A its height, V the motor's speed limit [deg/s].
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from orient_eye.commands.exponentials import ExponentialSum, Term
 from orient_eye.constants import SPEED_LIMIT
 from orient_eye.registry import Registry
 
-Array = NDArray[np.float64]
-_SLOWEST_ONSET = 1e-2  # of B: below it variants 2 and 3 differ from their limit C -> 0 by less than 1 %
+if TYPE_CHECKING:  # the names are listed without NumPy
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from orient_eye.commands.exponentials import ExponentialSum
+
+    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -56,71 +60,9 @@ class Pulse:
     onset: Onset | None = None
 
 
-def _variant1(B: Array, k0: Array, C: Array) -> ExponentialSum:
-    """A t exp(-B t), 4.3; A = (D - F) B^2 / k0 (4.9)."""
-    return ExponentialSum((Term(B**2 / k0, 1, B),))
-
-
-def _variant2(B: Array, k0: Array, C: Array) -> ExponentialSum:
-    """A exp(-B t) (1 - exp(-C t)), 4.11; A = (D - F) B (B + C) / (C k0) (4.15)."""
-    A = B * (B + C) / (C * k0)
-    return ExponentialSum((Term(A, 0, B), Term(-A, 0, B + C)))
-
-
-def _variant3(B: Array, k0: Array, C: Array) -> ExponentialSum:
-    """A exp(-B t) (1 - exp(-C t) - C t exp(-C t)), 4.19; A = (D - F) B (B + C)^2 / (C^2 k0).
-
-    The thesis prints that amplitude with B (B + C^2) in 4.24, which is a misprint.
-    """
-    A = B * (B + C) ** 2 / (C**2 * k0)
-    return ExponentialSum((Term(A, 0, B), Term(-A, 0, B + C), Term(-A * C, 1, B + C)))
-
-
-def _root2(size: Array, B: Array, k0: Array, V: float) -> Array:
-    """A C = V (4.18), so C = V k0 / (|D - F| B) - B; at most 1e5, for saccades of no size."""
-    return np.asarray(np.minimum(V * k0 / (size * B) - B, 1e5))
-
-
-def _keeps2(size: Array, B: Array, k0: Array, V: float) -> NDArray[np.bool_]:
-    return np.asarray(V * k0 / (size * B) - B >= _SLOWEST_ONSET * B)
-
-
-def _terms3(size: Array, B: Array, k0: Array, V: float) -> tuple[Array, Array]:
-    """a and W of a (B + C)^2 = W C, the bound A C / e + A k0 C^2 / (B + C)^2 = V on the speed (4.31)."""
-    return size * B / (k0 * np.e), V - size * B
-
-
-def _root3(size: Array, B: Array, k0: Array, V: float) -> Array:
-    """The smaller root of the bound; at least 0.01 B, for saccades so small that the limit asks for less."""
-    a, W = _terms3(size, B, k0, V)
-    root = np.sqrt(np.maximum(W**2 - 4 * a * B * W, 0.0))
-    return np.asarray(np.maximum(2 * a * B**2 / (W - 2 * a * B + root), _SLOWEST_ONSET * B))
-
-
-def _keeps3(size: Array, B: Array, k0: Array, V: float) -> NDArray[np.bool_]:
-    a, W = _terms3(size, B, k0, V)
-    return np.asarray(4 * a * B < W)
-
-
 PULSES: Registry[Pulse] = Registry(
     "pulse",
-    {
-        "1": Pulse("A t exp(-B t): variant 1 of the thesis (4.3.1)", _variant1, lambda B, C: (B, B)),
-        "2": Pulse(
-            "A exp(-B t) (1 - exp(-C t)): variant 2 of the thesis (4.3.2)",
-            _variant2,
-            lambda B, C: (B, B + C),
-            # The initial speed falls with C: the slowest onset, short of the limit C -> 0, which is variant 1.
-            Onset(85.0, _keeps2, _root2, lambda size, B, k0, V: _SLOWEST_ONSET * B),
-        ),
-        "3": Pulse(
-            "A exp(-B t) (1 - exp(-C t) - C t exp(-C t)): variant 3 of the thesis (4.3.3)",
-            _variant3,
-            lambda B, C: (B, B + C, B + C),
-            # The bound on the speed is least at C = B.
-            Onset(3.6, _keeps3, _root3, lambda size, B, k0, V: B),
-        ),
-    },
+    {name: f"orient_eye.commands.thesis_pulses:VARIANT_{name}" for name in "123"},
     Pulse,
 )
 """Name to pulse."""
@@ -133,6 +75,8 @@ def keeps_speed_limit(
 
     A pulse without an onset has no C that could.
     """
+    import numpy as np
+
     if pulse.onset is None:
         return np.zeros(np.shape(step), bool)
     return pulse.onset.keeps(np.maximum(np.abs(step), 1e-9), B, k0, speed_limit)
@@ -151,6 +95,8 @@ def varying_C(pulse: Pulse, step: Array, B: Array, k0: Array, speed_limit: float
         k0: [1/s].
         speed_limit: V [deg/s].
     """
+    import numpy as np
+
     assert pulse.onset is not None
     size = np.maximum(np.abs(step), 1e-9)
     feasible = pulse.onset.keeps(size, B, k0, speed_limit)
