@@ -118,8 +118,7 @@ def test_is_a_plant(plant: Plant) -> None:
         assert motor.unit
     assert 0 < plant.step_s < 0.01
     assert plant.horizon_s is None or plant.horizon_s > 0
-    assert plant.pace.saccades_per_update > 0
-    assert plant.pace.evaluation_pairs > 0
+    assert plant.evaluation_pairs > 0
 
 
 def test_an_identity_brings_the_plant_back(plant: Plant) -> None:

@@ -284,7 +284,7 @@ def test_trains_on_the_whole_eye(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     from orient_eye.search.optimum import find_optimum
 
     def short(task: SaccadeTask, start: State, target: np.ndarray, **_: object) -> object:
-        return find_optimum(task, start, target, np.random.default_rng(0), population=12, generations=2)
+        return find_optimum(task, start, target, np.random.default_rng(0), effort=0.1)
 
     monkeypatch.setattr(evaluation, "searched_optimum", short)
     result = train(config, tmp_path / "run", quiet=True)
@@ -297,7 +297,7 @@ def test_preset_of_the_thesis_and_options_beside_it() -> None:
     assert (config.learning_rate, config.replay_size, config.updates) == (1e-5, 30_000, 300_000)  # thesis 4.6
     assert config.batch_size == 512
     assert config.temperature == "auto"
-    assert TrainConfig(plant="mujoco").resolved().saccades_per_update == 32
+    assert TrainConfig(plant="mujoco").resolved().evaluation_pairs == 60
 
 
 def test_device_that_is_not_there() -> None:

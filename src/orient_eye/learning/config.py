@@ -27,7 +27,8 @@ def _default(words: str) -> Any:
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "ours": {
-        "updates": 8_000,
+        "updates": 10_000,
+        "saccades_per_update": 16,
         "updates_per_rollout": 8,
         "batch_size": 512,
         "replay_size": 60_000,
@@ -96,9 +97,9 @@ class TrainConfig:
     """How long a simulated saccade lasts, in s."""
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
-    updates: Annotated[int | None, _default("8000; thesis 300000")] = None
+    updates: Annotated[int | None, _default("10000; thesis 300000")] = None
     """How many times the networks are updated."""
-    saccades_per_update: Annotated[int | None, _default("64, 32 simulated; thesis 1")] = None
+    saccades_per_update: Annotated[int | None, _default("16; thesis 1")] = None
     """Fresh saccades performed for each update."""
     updates_per_rollout: Annotated[int | None, _default("8, or what divides the updates; thesis 1")] = None
     """Updates between two rollouts: a rollout performs the saccades of that many updates in one batch."""
@@ -174,8 +175,7 @@ class TrainConfig:
         task = task or self.make_task()
         shared = {f.name for f in fields(TrainSettings)} & {f.name for f in fields(TrainConfig)}
         values: dict[str, Any] = {
-            "saccades_per_update": task.plant.pace.saccades_per_update,
-            "evaluation_pairs": task.plant.pace.evaluation_pairs,
+            "evaluation_pairs": task.plant.evaluation_pairs,
             **_PRESETS[self.preset],
             **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},
         }

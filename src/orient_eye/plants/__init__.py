@@ -34,19 +34,6 @@ if TYPE_CHECKING:  # names and options are listed without the libraries that com
 
 
 @dataclass(frozen=True)
-class Pace:
-    """How many saccades are worth performing on a plant, where nobody says.
-
-    Attributes:
-        saccades_per_update: of a network that learns: about as long as the update itself takes.
-        evaluation_pairs: held against the searched optimum.
-    """
-
-    saccades_per_update: int
-    evaluation_pairs: int
-
-
-@dataclass(frozen=True)
 class PulseRates:
     """Bounds of B and k0 [1/s] in which the best pulse-steps of a plant lie; on a logarithmic scale."""
 
@@ -64,10 +51,8 @@ class PulseRates:
         return cls((0.4 * slowest, 25 * fastest), (0.05 * slowest, 3 * fastest))
 
 
-SIMULATED = Pace(32, 60)
-CLOSED_FORM = Pace(64, 300)
-LIMITED = Pace(64, 30)
-"""Of an eye in closed form whose motor's limits are simulated."""
+EVALUATION_PAIRS = 60
+"""Of a simulated eye."""
 
 
 @runtime_checkable
@@ -79,7 +64,7 @@ class Plant(Protocol):
         motors: what moves the eye, (motors,).
         step_s: interval between the samples of its trajectories [s].
         horizon_s: how long a saccade has to last so that it can be measured; None where it needs no horizon.
-        pace: how many saccades are worth performing on it.
+        evaluation_pairs: how many random saccades are worth holding against the searched optimum.
         slow_pole: the pole [1/s] that k0 can cancel (thesis 4.2), on a plant that is linear and has one such; None
             where what k0 should be has to be found.
         pulse_rates: bounds of B and of k0 [1/s] that hold the best pulse-steps, where the thesis' (18 to 80, 5 to 40)
@@ -90,7 +75,7 @@ class Plant(Protocol):
     motors: tuple[Motor, ...]
     step_s: float
     horizon_s: float | None
-    pace: Pace
+    evaluation_pairs: int
     slow_pole: float | None
     pulse_rates: PulseRates | None
 

@@ -21,7 +21,7 @@ from orient_eye.errors import InputError
 from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures, View, measure, measure_angle, merged
 from orient_eye.movement.trajectory import Trajectory, concatenate
-from orient_eye.plants import CLOSED_FORM, LIMITED, PulseRates
+from orient_eye.plants import PulseRates
 from orient_eye.plants.limits import are_limited, limited_surrogate, travel_s
 from orient_eye.plants.linear_response import (
     LinearResponse,
@@ -82,7 +82,7 @@ class LinearPlant(SimulatedPlant):
         limited = are_limited(self.motors)
         first_order = numbers.w0 is not None and not numbers.dead_time
         self.slow_pole = numbers.w0 if first_order and not limited else None
-        self.pace = LIMITED if limited else CLOSED_FORM
+        self.evaluation_pairs = 30 if limited else 300
         self.horizon_s = self._horizon() if limited or numbers.range is not None else None
         as_thesis = first_order and not limited and numbers.eye is not None
         self.pulse_rates = None if as_thesis else PulseRates.around([numbers.w0 or numbers.wn or 0.0])
