@@ -9,8 +9,8 @@ A movement is either sampled (`SampledMovement`) or a closed form, which stands 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from orient_eye.commands import Command, path_energy
 from orient_eye.constants import BAND
-from orient_eye.movement.measures import Measures, View, measure
+from orient_eye.movement.measures import Measures, View, measure, merged, merged_rows
+from orient_eye.movement.tail import Tail, tail_of
 from orient_eye.movement.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -68,6 +69,10 @@ def energy_of(command: Command, motor: Array, time: Array, changed: NDArray[np.b
     return np.where(changed, path_energy(motor, float(time[1] - time[0])), told)
 
 
+def _known(rest: Array, motor: Array) -> Array:
+    return rest
+
+
 @dataclass(frozen=True)
 class SampledMovement:
     """A movement known at samples.
@@ -78,6 +83,9 @@ class SampledMovement:
         saturated: see `Movement`.
         limited: see `Movement`.
         rest: orientations (saccades, 4) in which the eye rests when its motors stand at (saccades, motors).
+        endless: whether the saccades go on after their samples, and what follows counts; else it is as if there were
+            nothing.
+        further: of saccades that go on, some of them (an index) over a longer time; None where this is the longest.
     """
 
     sampled: Trajectory
@@ -85,20 +93,64 @@ class SampledMovement:
     saturated: NDArray[np.bool_]
     limited: NDArray[np.bool_]
     rest: Callable[[Array], Array]
+    endless: bool = False
+    further: "Callable[[NDArray[np.intp]], SampledMovement] | None" = None
+
+    @cached_property
+    def stands(self) -> Array:
+        """Where the motors come to stand, (saccades, motors)."""
+        low, high = np.array([motor.range for motor in self.sampled.motors]).T
+        return np.clip(self.command.final, low, high)
 
     @cached_property
     def final(self) -> Array:
         """Orientations in which the eye comes to rest, (saccades, 4): so a short horizon does not shift them."""
-        low, high = np.array([motor.range for motor in self.sampled.motors]).T
-        return self.rest(np.clip(self.command.final, low, high))
+        return self.rest(self.stands)
+
+    @cached_property
+    def tail(self) -> Tail | None:
+        """How the saccades go on; None where nothing follows that counts."""
+        return tail_of(self.sampled, self.final, self.stands) if self.endless else None
 
     def measure(self, band: float = BAND, of: View = "orientation") -> Measures:
-        """See `Movement.measure`; interpolated between samples, so that measures are continuous in the command."""
-        return measure(self.sampled, self.final, band=band, of=of)
+        """See `Movement.measure`; interpolated between samples, so that measures are continuous in the command.
+
+        Of saccades that go on they do not depend on where the samples end: what may still do something is stepped on.
+        """
+        found = measure(self.sampled, self.final, band=band, of=of, tail=self.tail)
+        if self.tail is None or self.further is None:
+            return found
+        goes_on = ~self.tail.sure(found.amplitude_deg, found.overshoot, band)
+        if not goes_on.any():
+            return found
+        movement, rows = self._later(goes_on)
+        far = movement.measure(band, of)[rows]
+        in_time = far.settled & (far.settling_time_s <= self.sampled.time[-1])
+        return merged(goes_on, replace(far, settled=in_time), found[~goes_on])
 
     def energy(self) -> Array:
         """See `Movement.energy`: the command's own where the motors followed it, else that of the path they took."""
-        return energy_of(self.command, self.sampled.motor, self.sampled.time, self.saturated | self.limited)
+        energy = energy_of(self.command, self.sampled.motor, self.sampled.time, self.saturated | self.limited)
+        if self.tail is None or self.further is None:
+            return energy
+        moving = np.isinf(self.tail.doubt)
+        if moving.any():
+            movement, rows = self._later(moving)
+            energy = merged_rows(moving, movement.energy()[rows], energy[~moving])
+        return energy
+
+    def _later(self, which: NDArray[np.bool_]) -> "tuple[SampledMovement, NDArray[np.bool_]]":
+        """A longer movement that has these saccades, kept for the next question, and which of its own they are."""
+        assert self.further is not None
+        if not self._kept or (which & ~self._kept[0][0]).any():
+            rest = partial(_known, self.final[which])
+            self._kept[:] = [(which, replace(self.further(np.flatnonzero(which)), rest=rest))]
+        kept, movement = self._kept[0]
+        return movement, which[kept]
+
+    @cached_property
+    def _kept(self) -> "list[tuple[NDArray[np.bool_], SampledMovement]]":
+        return []
 
     def trajectory(self) -> Trajectory:
         """See `Movement.trajectory`."""

@@ -7,7 +7,7 @@ A movement in closed form measures itself (`orient_eye.plants.linear`), by the s
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,12 @@ from scipy.spatial.transform import Rotation
 
 from orient_eye import rotations
 from orient_eye.constants import BAND
+from orient_eye.movement.tail import Tail
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.rotations import rotation
 
 Array = NDArray[np.float64]
+_ROUNDING = 1e-11  # of the amplitude: an eye that has come to its end and stays there has no overshoot
 View = Literal["orientation", "gaze"]
 """What is measured: the whole orientation, or the direction of gaze alone."""
 
@@ -37,8 +39,9 @@ class Measures:
         overshoot: share of the amplitude by which the eye goes beyond the final orientation, >= 0.
         skewness: time from peak velocity to the settling time / duration; 0.5 is symmetric, NaN for a
             saccade without duration.
-        settled: False where the horizon ended before the eye stayed within the band; the settling time
-            is then the horizon.
+        settled: False where the horizon ended before the eye stayed within the band. The settling time is then where
+            that came to be all the same, on a saccade that goes on (`orient_eye.movement.SampledMovement`), or the
+            horizon.
         failed: True where the simulation failed: the measures are NaN.
     """
 
@@ -52,9 +55,18 @@ class Measures:
     settled: NDArray[np.bool_]
     failed: NDArray[np.bool_]
 
+    def __getitem__(self, which: NDArray[Any]) -> "Measures":
+        """Some of the saccades."""
+        return Measures(**{name: value[which] for name, value in vars(self).items()})
+
 
 def measure(
-    trajectory: Trajectory, final: Array | None = None, *, band: float = BAND, of: View = "orientation"
+    trajectory: Trajectory,
+    final: Array | None = None,
+    *,
+    band: float = BAND,
+    of: View = "orientation",
+    tail: Tail | None = None,
 ) -> Measures:
     """Measure sampled saccades.
 
@@ -66,15 +78,18 @@ def measure(
         of: "orientation": amplitude and distance are angles of rotation, overshoot is progress about the axis from
             start to end. "gaze": they are angles between directions of gaze, and progress along their great circle;
             speed is that of the gaze.
+        tail: how the saccades go on after their last sample, to the same end; None where nothing follows that counts.
     """
     q, t = trajectory.orientation, trajectory.time
     final = q[:, -1] if final is None else final
     failed = trajectory.failed | ~np.isfinite(final).all(axis=1)
-    safe = np.where(failed[:, None, None], rotations.FORWARD, q)
-    final = np.where(failed[:, None], rotations.FORWARD, final)
-
-    velocity = np.where(failed[:, None, None], 0.0, trajectory.angular_velocity)
-    amplitude, distance, turned, speed = (_seen_whole if of == "orientation" else _seen_gaze)(safe, final, velocity)
+    safe, velocity = q, trajectory.angular_velocity
+    if failed.any():
+        safe = np.where(failed[:, None, None], rotations.FORWARD, q)
+        final = np.where(failed[:, None], rotations.FORWARD, final)
+        velocity = np.where(failed[:, None, None], 0.0, velocity)
+    seen = _seen_whole if of == "orientation" else _seen_gaze
+    amplitude, distance, turned, speed = seen(safe, final, velocity)
     settling, index, share, settled = _last_exit(t, distance, band * amplitude)
     rows = np.arange(len(safe))
     before, after = safe[rows, index], safe[rows, np.minimum(index + 1, len(t) - 1)]
@@ -84,6 +99,15 @@ def measure(
 
     peak, _ = _parabolic_peak(t, turned / np.maximum(amplitude, 1e-9)[:, None])
     peak_speed, peak_time = _parabolic_peak(t, speed)
+    beyond = np.ones(len(safe))
+    if tail is not None:
+        ends = np.stack([safe[:, 0], tail.end], axis=1)
+        beyond = np.maximum(1, seen(ends, final, np.zeros((len(safe), 2, 3)))[2][:, 1] / np.maximum(amplitude, 1e-9))
+        late = ~settled & (tail.rate > 0)
+        share = np.where(late, band * amplitude / np.where(late, distance[:, -1], 1), 1.0)
+        settling = settling - np.log(share) / np.where(late, tail.rate, 1)
+        then = Rotation.from_rotvec(tail.way * share[:, None]) * rotation(final)
+        at_settling = np.where(late[:, None], then.as_quat(scalar_first=True), at_settling)
     moved = amplitude > 1e-9
     return finished(
         final=final,
@@ -91,7 +115,7 @@ def measure(
         amplitude_deg=amplitude,
         settling_time_s=np.where(moved, settling, 0.0),
         peak_velocity_deg_s=peak_speed,
-        overshoot=np.where(moved, np.maximum(peak - 1, 0), 0.0),
+        overshoot=np.where(moved & (peak > beyond + _ROUNDING), peak - 1, 0.0),
         peak_time=peak_time,
         settled=settled | ~moved,
         failed=failed,
@@ -138,20 +162,45 @@ def measure_angle(
 
 def merged(which: NDArray[np.bool_], some: Measures, others: Measures) -> Measures:
     """Measures of a batch, of which some saccades (saccades,) were measured apart from the others."""
-    fields = {}
-    for name in Measures.__dataclass_fields__:
-        one, other = getattr(some, name), getattr(others, name)
-        fields[name] = np.empty((len(which), *one.shape[1:]), one.dtype)
-        fields[name][which], fields[name][~which] = one, other
-    return Measures(**fields)
+    return Measures(**{name: merged_rows(which, getattr(some, name), value) for name, value in vars(others).items()})
+
+
+def merged_rows(which: NDArray[np.bool_], some: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+    """Values (saccades, ...) of a batch from those of some saccades (saccades,) and of the others."""
+    values = np.empty((len(which), *some.shape[1:]), some.dtype)
+    values[which], values[~which] = some, others
+    return values
 
 
 def _seen_whole(orientation: Array, final: Array, velocity: Array) -> tuple[Array, Array, Array, Array]:
     """Amplitude (saccades,), and over time distance from the end, turn from the start [deg], and speed [deg/s]."""
     start = orientation[:, 0]
-    turned = _turn_about(rotation(final) * rotation(start).inv(), start, orientation)
-    distance = rotations.angle_between(orientation, final[:, None])
-    return rotations.angle_between(start, final), distance, turned, np.linalg.norm(velocity, axis=-1)
+    vector = (rotation(final) * rotation(start).inv()).as_rotvec()
+    axis = vector / np.maximum(np.sqrt(_dot(vector, vector)), 1e-300)[:, None]
+    # The parts of r = q p^-1 are linear in q; the twist about an axis is 2 atan2(r_vec . axis, r_w).
+    of_end, of_start = _over(final), _over(start)
+    along = np.stack([of_start[..., 0], _dot(of_start[..., 1:], axis[:, None])], axis=-1)
+    parts = orientation @ np.concatenate([of_end, along], axis=-1)
+    distance = _whole_angle(np.sqrt(_dot(parts[..., 1:4], parts[..., 1:4])), np.abs(parts[..., 0]))
+    sign = np.where(parts[..., 4] < 0, -1.0, 1.0)
+    turned = _whole_angle(sign * parts[..., 5], sign * parts[..., 4])
+    return rotations.angle_between(start, final), distance, turned, np.sqrt(_dot(velocity, velocity))
+
+
+def _dot(one: Array, other: Array) -> Array:
+    """Of vectors (..., 3): the same in any batch, and numpy's own sum takes three times as long on so short an axis."""
+    return np.asarray(one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1] + one[..., 2] * other[..., 2])
+
+
+def _over(quaternion: Array) -> Array:
+    """Matrices (saccades, 4, 4) with which q times the inverse of a quaternion (saccades, 4) is q @ matrix."""
+    w, x, y, z = quaternion.T
+    return np.moveaxis(np.array([[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]]), 2, 0)
+
+
+def _whole_angle(sine: Array, cosine: Array) -> Array:
+    """Angle [deg] from sine and cosine of its half."""
+    return np.asarray(np.rad2deg(2 * np.arctan2(sine, cosine)))
 
 
 def _seen_gaze(orientation: Array, final: Array, velocity: Array) -> tuple[Array, Array, Array, Array]:
@@ -166,19 +215,6 @@ def _seen_gaze(orientation: Array, final: Array, velocity: Array) -> tuple[Array
     ahead /= np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-300)
     turned = np.rad2deg(np.arctan2(np.einsum("ntk,nk->nt", gaze, ahead), np.einsum("ntk,nk->nt", gaze, start)))
     return amplitude, distance, turned, np.linalg.norm(np.cross(velocity, gaze), axis=-1)
-
-
-def _turn_about(turn: Rotation, start: Array, orientation: Array) -> Array:
-    """Angle [deg] (saccades, time) by which orientations are turned from start about the axis of turn."""
-    vector = turn.as_rotvec()
-    axis = vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-300)
-    # With r = q start^-1: the twist about the axis is 2 atan2(r_vec . axis, r_w), both linear in q.
-    w, v = start[:, :1], start[:, 1:]
-    along = np.concatenate([-(v * axis).sum(axis=-1, keepdims=True), w * axis - np.cross(v, axis)], axis=-1)
-    sine, cosine = (np.einsum("ntk,nk->nt", orientation, c) for c in (along, start))
-    sign = np.where(cosine < 0, -1.0, 1.0)
-    angle: Array = np.rad2deg(2 * np.arctan2(sign * sine, sign * cosine))
-    return angle
 
 
 def finished(

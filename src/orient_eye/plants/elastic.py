@@ -36,6 +36,8 @@ class ElasticPlant(SimulatedPlant):
         InputError: an eye or a rig that is none, or a rig's motor that the eye has not.
     """
 
+    resumes = True
+
     def __init__(
         self,
         options: dict[str, Any],

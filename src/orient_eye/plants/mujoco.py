@@ -28,6 +28,7 @@ from orient_eye.motor import names
 from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.limits import Limits
 from orient_eye.plants.simulated import Run
+from orient_eye.plants.tavares import TavaresPlant
 from orient_eye.rig import Rig
 from orient_eye.rotations import rotation
 from orient_eye.state import State
@@ -160,6 +161,13 @@ class MujocoPlant(ElasticPlant):
             share = (at - row)[:, None]
             control[..., self._motor_ctrl] = (1 - share) * command[:, row] + share * command[:, row + 1]
         return control
+
+    def twin(self) -> TavaresPlant | None:
+        """The compiled reference with the same eye and limits; None for an eye that it does not compute."""
+        try:
+            return TavaresPlant(**self.options, threads=self.threads)
+        except InputError:
+            return None
 
     def torque(self, orientation: Array, motor: Array) -> Array:
         """See `orient_eye.plants.elastic.ElasticPlant`."""

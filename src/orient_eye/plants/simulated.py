@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from orient_eye.errors import InputError
 from orient_eye.motor import Motor, names, ranges
 from orient_eye.movement import Movement, SampledMovement, energy_of
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.plants import SIMULATED, Pace, Plant, PulseRates
+from orient_eye.plants import EVALUATION_PAIRS, Plant, PulseRates
 from orient_eye.plants.limited_motor import follow
 from orient_eye.rotations import FORWARD
 from orient_eye.state import State
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     import mujoco
 
 Array = NDArray[np.float64]
+_LONGER = 1.5  # times as long a saccade goes on that may still do something
+_LONGEST = 8.0  # times the plant's horizon, at most; what is left then is extrapolated
 Run = tuple[Array, Array, Array | None, NDArray[np.bool_]]
 
 
@@ -81,20 +84,58 @@ class GivenMovement:
         return energy_of(given.command, given.motor, time, given.saturated | given.limited)
 
 
+@dataclass(frozen=True)
+class _Some:
+    """Some saccades of a command that cannot give some of itself."""
+
+    command: Command
+    which: NDArray[np.intp]
+    duration_s = None
+
+    @property
+    def saturates(self) -> bool:
+        return self.command.saturates
+
+    def __len__(self) -> int:
+        return len(self.which)
+
+    def sample(self, step_s: float, samples: int) -> Array:
+        return self.command.sample(step_s, samples)[self.which]
+
+    @property
+    def final(self) -> Array:
+        return self.command.final[self.which]
+
+    def energy(self) -> Array:
+        return self.command.energy()[self.which]
+
+    @property
+    def too_fast(self) -> NDArray[np.bool_]:
+        return self.command.too_fast[self.which]
+
+
+def _some(command: Command, which: NDArray[np.intp]) -> Command:
+    some: Command = command[which] if hasattr(command, "__getitem__") else _Some(command, which)
+    return some
+
+
 class SimulatedPlant(ABC):
     """A plant that is stepped: see `orient_eye.plants.Plant` for its members.
 
-    A subclass sets `name` and `motors` and writes `run`, `rest`, `hold` and `identity`.
+    A subclass sets `name` and `motors` and writes `run`, `rest`, `hold` and `identity`. A saccade that may still change
+    a measure where its samples end is stepped on: from its beginning, or from there on a plant that `resumes`, whose
+    eye is wholly told by a `State`, also while its motors move.
     """
 
     name: str
     motors: tuple[Motor, ...]
     step_s: float = STEP_S
     horizon_s: float | None = HORIZON_S
-    pace: Pace = SIMULATED
+    evaluation_pairs: int = EVALUATION_PAIRS
     slow_pole: float | None = None
     pulse_rates: PulseRates | None = None
     tendons: tuple[str, ...] = ()
+    resumes: bool = False
 
     @abstractmethod
     def run(self, motor: Array, start: State) -> Run:
@@ -139,8 +180,21 @@ class SimulatedPlant(ABC):
         random: np.random.Generator | None = None,
     ) -> Movement:
         """Perform a batch of saccades; see `orient_eye.plants.Plant`."""
-        given = self.prepare(as_command(command, self.step_s), start, horizon_s)
-        orientation, velocity, tension, diverged = self.run(given.motor, given.start)
+        command = as_command(command, self.step_s)
+        return self._moved(self.prepare(command, start, horizon_s), start)
+
+    def _moved(self, given: "Given", start: State | None, before: Trajectory | None = None) -> SampledMovement:
+        """A movement, and how it goes on where its command has no end; `before` are its first samples."""
+        if before is None or not self.resumes:
+            orientation, velocity, tension, diverged = self.run(given.motor, given.start)
+        else:
+            last = len(before.time) - 1
+            here = State(before.orientation[:, -1], given.motor[:, last], before.angular_velocity[:, -1])
+            orientation, velocity, tension, diverged = self.run(np.ascontiguousarray(given.motor[:, last:]), here)
+            orientation = np.concatenate([before.orientation, orientation[:, 1:]], axis=1)
+            velocity = np.concatenate([before.angular_velocity, velocity[:, 1:]], axis=1)
+            if tension is not None and before.tension is not None:
+                tension = np.concatenate([before.tension, tension[:, 1:]], axis=1)
         failed = given.failed | diverged
         motor = given.motor
         for array in (orientation, velocity, motor, *(() if tension is None else (tension,))):
@@ -149,7 +203,24 @@ class SimulatedPlant(ABC):
             self.times(motor.shape[1]), orientation, velocity, given.told, motor, tension, failed,
             motors=self.motors, tendon_names=self.tendons,
         )  # fmt: skip
-        return SampledMovement(sampled, given.command, given.saturated, given.limited, self.rest)
+
+        endless, done = given.command.duration_s is None, motor.shape[1] > round(self._longest_s / self.step_s)
+        further = partial(self._further, given.command, start, sampled) if endless and not done else None
+        return SampledMovement(
+            sampled, given.command, given.saturated, given.limited, self.rest, endless=endless, further=further
+        )
+
+    def _further(
+        self, command: Command, start: State | None, before: Trajectory, which: NDArray[np.intp]
+    ) -> SampledMovement:
+        """Some saccades over a longer time."""
+        horizon_s = min(max(_LONGER * float(before.time[-1]), 2 * self.step_s), self._longest_s)
+        some, begin = _some(command, which), None if start is None else start[which]
+        return self._moved(self.prepare(some, begin, horizon_s), begin, before[which])
+
+    @property
+    def _longest_s(self) -> float:
+        return min(_LONGEST * (self.horizon_s or HORIZON_S), LONGEST_S)
 
     def times(self, samples: int) -> Array:
         """Of the samples [s]."""
