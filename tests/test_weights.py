@@ -218,14 +218,14 @@ def test_weights_of_the_whole_eye() -> None:
     """MuJoCo and the compiled reference, two programs, agree; the saccade is at the onset of its overshoot."""
     task = task_on(MujocoPlant(threads=1))
     D, k0 = resolved(task, ChosenSaccade())
-    assert (D, k0) == (pytest.approx(20.268, abs=0.005), pytest.approx(16.302, abs=0.01))
+    assert (D, k0) == (pytest.approx(20.268, abs=0.005), pytest.approx(16.291, abs=0.005))
     action = np.array([[35.0, D, k0 + d] for d in (-0.05, 0.005)])
     outcome = task.perform(*_both(task, action))
     assert outcome.measures.overshoot[0] > 1e-6
-    assert outcome.measures.overshoot[1] == 0
+    assert outcome.measures.overshoot[1] < 1e-6
     here = three(solve_weights(task, ChosenSaccade(D=(D,), k0=k0)))
-    np.testing.assert_allclose(here, (4.08e7, 5.53e5, 5.5e7), rtol=0.03)
-    np.testing.assert_allclose(three(solve_weights(task_on(TavaresPlant()))), here, rtol=0.03)
+    np.testing.assert_allclose(here, (3.56e7, 5.74e5, 4.22e7), rtol=0.01)
+    np.testing.assert_allclose(three(solve_weights(task_on(TavaresPlant()))), here, rtol=0.02)
 
 
 def _both(task: SaccadeTask, action: Array) -> tuple[Any, Array, Array]:

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _THESIS_PLANT = {"plant": "lpf", "K": 1.4758, "w0": 17.5, "motor": "motor2"}
 _THESIS_D = 20.33  # deg, as printed; 30 deg / K = 20.328
 _SYMBOLS = ("B", "D", "k0")
+_SHOWS = 1e-6  # share of the amplitude
 _LARGEST_DEG = 30.0
 
 
@@ -205,7 +206,7 @@ def told(task: SaccadeTask, action: Array) -> str:
 
 
 def _onset_of_overshoot(task: SaccadeTask, chosen: ChosenSaccade, start: State, target: Array) -> float:
-    """The largest k0 [1/s] with which the chosen saccade still overshoots."""
+    """The largest k0 [1/s] with which the chosen saccade overshoots by more than measures are exact to."""
     if task.plant.slow_pole is not None:
         return task.plant.slow_pole  # where zero and pole cancel (4.2)
     assert chosen.D is not None
@@ -216,7 +217,7 @@ def _onset_of_overshoot(task: SaccadeTask, chosen: ChosenSaccade, start: State, 
     for _ in range(4):  # sixteen at a time: each round narrows the bracket to a fifteenth
         k0 = np.linspace(low, high, 16)
         actions = np.stack([action_of(task, chosen.B, chosen.D, k) for k in k0])
-        over = task.perform(start[which], actions, target[which]).measures.overshoot > 0
+        over = task.perform(start[which], actions, target[which]).measures.overshoot > _SHOWS
         if not over[0] or over[-1]:
             raise InputError(
                 f"with B = {chosen.B:g} 1/s the overshoot does not set in between k0 = {first:g} and {last:g} 1/s on "
