@@ -4,7 +4,8 @@
     python scripts/results.py runs/results --plants lpf --cases 1 --seeds 0
 
 Every run is `orient-eye train` with its defaults. Prints the tables of README.md and docs/learning.md; with
---write puts them there, and with --ship the best run of each case into models/policies.
+--write puts them there, and with --ship the best run of each case into models/policies. The searched optimum travels
+with a shipped policy; --optimum fills in what is missing or no longer true.
 """
 
 import concurrent.futures
@@ -20,7 +21,9 @@ import numpy as np
 import tyro
 
 from orient_eye.files import write_text
-from orient_eye.learning.policy import Policy
+from orient_eye.learning.evaluation import carry_optimum, evaluation_saccades
+from orient_eye.learning.policy import Policy, shipped_policies
+from orient_eye.search.optimum_file import NAME
 from orient_eye.task.cases import CASES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,10 +48,16 @@ class Results:
     """Put the tables into README.md and docs/learning.md."""
     ship: bool = False
     """Copy the best run of each case into models/policies."""
+    optimum: bool = False
+    """Train nothing: put the searched optimum beside every shipped policy."""
 
 
 def main(options: Results) -> None:
     """Run what is missing, then print."""
+    if options.optimum:
+        for name, folder in shipped_policies().items():
+            print(f"models/policies/{name}: {carry(folder)}", file=sys.stderr)
+        return
     jobs = [("lpf", case, seed) for seed in options.seeds for case in options.cases if "lpf" in options.plants]
     with concurrent.futures.ThreadPoolExecutor(options.parallel) as pool:
         list(pool.map(lambda job: run(options.folder, *job), jobs))
@@ -134,8 +143,16 @@ def ship(folder: Path) -> None:
     for (plant, case), runs in results(folder).items():
         best = runs[int(np.argmin([run["gap_mean"] for run in runs]))]["folder"]
         policy = Policy.load(best)
-        policy.save(ROOT / "models" / "policies" / f"{plant}-{case}")
+        goal = policy.save(ROOT / "models" / "policies" / f"{plant}-{case}").parent
+        carry(goal)
         print(f"models/policies/{plant}-{case}: from {best.name}", file=sys.stderr)
+
+
+def carry(folder: Path) -> Path:
+    """Put the optimum of a policy's evaluation saccades beside it, searched unless the right one is there."""
+    policy = Policy.load(folder)
+    pairs, table = evaluation_saccades(policy.task(), policy.manifest["result"]["pairs"], carried=folder / NAME)
+    return carry_optimum(pairs, table, folder)
 
 
 if __name__ == "__main__":

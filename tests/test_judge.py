@@ -3,6 +3,7 @@ program, and searches by other means.
 """
 
 import functools
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,11 +18,13 @@ from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.commands.pulses import PULSES, varying_C
 from orient_eye.constants import YAW_LIMIT_DEG
 from orient_eye.errors import InputError
+from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures, measure
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.rotations import FORWARD, from_euler, from_yaw, gaze, to_euler
-from orient_eye.search.optimum import Optimum, _scan, find_optimum
+from orient_eye.search.optimum import Optimum, find_optimum
+from orient_eye.search.simplex import around, climb
 from orient_eye.state import State
 from orient_eye.surrogate import Surrogate
 from orient_eye.task.actions import B_RANGE, K0_RANGE
@@ -292,7 +295,7 @@ TABLE_COST = np.array([28940, 40227, 57314, 70546, 87028, 101192])
 @functools.cache
 def table_optimum() -> Optimum:
     start, _, target = chosen(AMPLITUDE, TABLE_B, TABLE_KD, TABLE_K0)
-    return find_optimum(TASK, start, target, np.random.default_rng(0), generations=100)
+    return find_optimum(TASK, start, target, np.random.default_rng(0), effort=2)
 
 
 def test_actions_of_the_table_cost_what_it_says() -> None:
@@ -300,22 +303,14 @@ def test_actions_of_the_table_cost_what_it_says() -> None:
     np.testing.assert_allclose(cost, TABLE_COST, rtol=0, atol=0.5)
 
 
-def test_scans_leave_a_basin_that_is_not_the_best() -> None:
-    """Case 2-varying: B = 70 is 2.3 % short; differential evolution alone stopped there once in some hundreds."""
+def test_a_lone_saccade_is_enough_for_the_basin_that_is_the_best() -> None:
+    """Case 2-varying: B = 70 is 2.3 % short, and no saccade beside it tells."""
     task = SaccadeTask.of_case(TASK.plant, "2-varying")
     start, target = horizontal([-13.911318], [14.538076], task)
-    low, high = task.actions.low, task.actions.high
-
-    def judge(x: Array) -> Array:
-        many = np.zeros(x.shape[1], int)
-        return task.perform(start[many], low + x[0] * (high - low), target[many]).reward.total[None]
-
-    stuck = ((np.array([[70.12327804, 9.81393982, 17.50011878]]) - low) / (high - low))[None]
-    x, value = _scan(np.tile(stuck, (1, 48, 1)), np.zeros((1, 48)), judge, lambda done: None)
-    best = find_optimum(task, start, target, np.random.default_rng(0)).reward[0]
-    assert judge(stuck)[0, 0] < best * 1.02
-    assert value.max() == pytest.approx(best, rel=2e-3)
-    assert judge(x).max() == value.max()
+    stuck = task.perform(start, np.array([[70.12327804, 9.81393982, 17.50011878]]), target).reward.total[0]
+    found = [find_optimum(task, start, target, np.random.default_rng(seed)).reward[0] for seed in range(4)]
+    assert max(found) - min(found) < 1e-4 * abs(max(found))
+    assert stuck < max(found) * 1.02
 
 
 def test_the_search_finds_the_table() -> None:
@@ -365,7 +360,7 @@ def test_scipy_finds_no_better(index: int) -> None:
 def test_the_weights_make_the_chosen_saccade_optimal() -> None:
     """Thesis 4.4.5: 0 to 30 deg, B = 35, D = 20.33, k0 = 17.5."""
     start, target = horizontal([0.0], [30.0])
-    found = find_optimum(TASK, start, target, np.random.default_rng(3), generations=100).action[0]
+    found = find_optimum(TASK, start, target, np.random.default_rng(3), effort=2).action[0]
     assert (np.abs(found - [35, 20.33, 17.5]) < [0.25, 0.01, 0.02]).all()
 
 
@@ -374,12 +369,12 @@ def random_pairs(count: int) -> tuple[State, Array]:
 
 
 def test_another_search_finds_no_better() -> None:
-    """45 random pairs, other seed, fewer candidates for longer."""
+    """45 random pairs, other seed, three times as long."""
     start, target = random_pairs(45)
     found = find_optimum(TASK, start, target, np.random.default_rng(1))
-    other = find_optimum(TASK, start, target, np.random.default_rng(2), population=24, generations=75)
+    other = find_optimum(TASK, start, target, np.random.default_rng(2), effort=3)
     gap = (other.reward - found.reward) / np.abs(other.reward)
-    assert gap.max() < 0.005
+    assert gap.max() < 1e-3
     low, high = TASK.actions.low, TASK.actions.high
     assert ((found.action >= low) & (found.action <= high)).all()
 
@@ -401,7 +396,7 @@ def test_same_generator_same_optimum() -> None:
     start, target = random_pairs(4)
 
     def search(seed: int) -> Optimum:
-        return find_optimum(TASK, start, target, np.random.default_rng(seed), population=12, generations=6)
+        return find_optimum(TASK, start, target, np.random.default_rng(seed), effort=0.1)
 
     one, same, other = search(5), search(5), search(6)
     np.testing.assert_array_equal(one.action, same.action)
@@ -413,7 +408,7 @@ def test_the_search_on_mujoco() -> None:
     """One search on the simulator: near the low-pass optimum, and better than its action."""
     task = SaccadeTask.of_case(MujocoPlant(), "1", weights=WEIGHTS, horizon_s=0.3)
     start, target = horizontal([-10.0], [10.0], task)
-    found = find_optimum(task, start, target, np.random.default_rng(0), population=30, generations=30)
+    found = find_optimum(task, start, target, np.random.default_rng(0), effort=0.5)
     B, D, k0 = found.action[0]
     rests = float(task.actions.likely(target)[0, 1])
     of_low_pass = np.array([[43.67, rests, 17.5]])
@@ -423,17 +418,90 @@ def test_the_search_on_mujoco() -> None:
     assert 17 < k0 < 19
 
 
-def test_search_options() -> None:
-    start, target = random_pairs(1)
+def test_a_search_counts_and_tells_what_it_does() -> None:
+    start, target = random_pairs(2)
     shares: list[float] = []
-    options = {"population": 12, "generations": 4}
-    found = find_optimum(TASK, start, target, np.random.default_rng(0), progress=shares.append, **options)
-    rounds = 4 + 5 * 3  # generations, and scans of five widths along three coordinates
-    assert shares == [(i + 1) / rounds for i in range(rounds)]
-    assert found.evaluations == 12 * (1 + rounds)
-    for population in (37, 9, 0):
-        with pytest.raises(InputError, match=f"multiple of 3, at least 12, got {population}"):
-            find_optimum(TASK, start, target, np.random.default_rng(0), population=population)
+    performed = 0
+
+    class Counted(LinearPlant):
+        def move(self, command: Any, *given: Any) -> Movement:
+            nonlocal performed
+            performed += len(command)
+            return super().move(command, *given)
+
+    found = find_optimum(
+        replace(TASK, plant=Counted()), start, target, np.random.default_rng(0), effort=0.2, progress=shares.append
+    )
+    assert found.evaluations == performed
+    assert shares == sorted(shares)
+    assert (shares[0] > 0, shares[-1]) == (True, 1)
+    for effort in (0, -1.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="number above 0"):
+            find_optimum(TASK, start, target, np.random.default_rng(0), effort=effort)
+
+
+def test_a_search_takes_a_fifth_of_the_saccades_it_took() -> None:
+    """Differential evolution and its scans performed 3648 a saccade."""
+    start, target = random_pairs(10)
+    found = find_optimum(TASK, start, target, np.random.default_rng(0))
+    assert found.evaluations / 10 < 3648 / 5
+
+
+class Rough(LinearPlant):
+    """The thesis' eye with a twin that alone may be asked often."""
+
+    asked = 0
+
+    def __init__(self, twin: LinearPlant) -> None:
+        super().__init__()
+        self.quicker = twin
+
+    def twin(self) -> LinearPlant:
+        return self.quicker
+
+    def move(self, command: Any, *given: Any) -> Movement:
+        Rough.asked += len(command)
+        return super().move(command, *given)
+
+
+def test_what_a_quicker_twin_finds_is_judged_on_the_plant() -> None:
+    start, target = random_pairs(6)
+    best = find_optimum(TASK, start, target, np.random.default_rng(1))
+    for w0, most, loss in ((17.5, 1, 1e-12), (17.5 * (1 + 1e-6), 1, 1e-4), (17.7, 150, 1e-3)):
+        Rough.asked = 0
+        task = replace(TASK, plant=Rough(LinearPlant(Surrogate(K, w0, eye="thesis"))))
+        found = find_optimum(task, start, target, np.random.default_rng(1))
+        assert Rough.asked <= 6 * most  # more than one a saccade where the twin is another eye
+        own = TASK.perform(start, found.action, target).reward.total
+        np.testing.assert_array_equal(found.reward, own)
+        np.testing.assert_allclose(found.reward, best.reward, rtol=loss)
+
+
+def test_simplices_climb_a_known_hill() -> None:
+    """Of each simplex another: a peak inside the box, on a face, and a ridge with a cliff on one side; five numbers."""
+    top = np.array([[0.3, 0.6, 0.5, 0.2, 0.9], [1.3, 0.5, 0.5, -0.2, 0.4]])
+
+    def hill(x: Array, which: NDArray[np.intp]) -> Array:
+        off = x - top[which]
+        return np.asarray(-(off**2).sum(axis=1))
+
+    points, value = climb(hill, around(np.full((2, 5), 0.5), np.full(5, 0.1), np.random.default_rng(0)), 400)
+    np.testing.assert_allclose(points[:, 0], np.clip(top, 0, 1), atol=1e-4)
+    assert (np.diff(value, axis=1) <= 0).all()
+    np.testing.assert_array_equal(value.ravel(), hill(points.reshape(-1, 5), np.repeat([0, 1], 6)))
+
+    def cliff(x: Array, _: NDArray[np.intp]) -> Array:
+        edge = x[:, 1] - 0.4 - 0.2 * (x[:, 0] - 0.7)
+        return np.asarray(-((x[:, 0] - 0.7) ** 2) - np.where(edge < 0, 100.0, 1.0) * np.abs(edge))
+
+    best, random = np.array([[0.5, 0.6]]), np.random.default_rng(0)
+    for step in (
+        0.1,
+        0.05,
+        0.02,
+    ):  # begun anew, as a search does
+        best = climb(cliff, around(best, np.full(2, step), random), 60)[0][:, 0]
+    np.testing.assert_allclose(best, [[0.7, 0.4]], atol=5e-3)
 
 
 def test_a_saccade_of_no_size_costs_nothing() -> None:

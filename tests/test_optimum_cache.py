@@ -4,11 +4,13 @@ import csv
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import safetensors.numpy
 from numpy.typing import NDArray
 
 from orient_eye.cli.optimum import Optimum as OptimumCommand
@@ -17,10 +19,12 @@ from orient_eye.cli.saccades import Saccades, read_pairs
 from orient_eye.errors import InputError
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.plants.mujoco import MujocoPlant
+from orient_eye.plants.tavares import TavaresPlant
 from orient_eye.run_directory import plain
 from orient_eye.search import optimum_cache
 from orient_eye.search.optimum import Optimum, find_optimum
-from orient_eye.search.optimum_cache import cache_folder, searched_optimum
+from orient_eye.search.optimum_cache import cache_folder, searched_optimum, task_key
+from orient_eye.search.optimum_file import Found, read_optimum, write_optimum
 from orient_eye.search.second_search import second_search
 from orient_eye.state import State
 from orient_eye.surrogate import Surrogate
@@ -137,7 +141,7 @@ def test_what_does_not_change_the_answer_does_not_search(searches: list[SaccadeT
     assert len(searches) == 1
 
 
-@pytest.mark.parametrize("damage", ["truncated", "flipped", "empty", "text", "zip of something else", "folder"])
+@pytest.mark.parametrize("damage", ["truncated", "flipped", "empty", "text", "something else", "folder"])
 def test_damaged_file_is_searched_again(searches: list[SaccadeTask], damage: str) -> None:
     searched_optimum(task(), START, TARGET)
     (path,) = kept()
@@ -150,9 +154,9 @@ def test_damaged_file_is_searched_again(searches: list[SaccadeTask], damage: str
     elif damage == "empty":
         path.write_bytes(b"")
     elif damage == "text":
-        path.write_text("not an archive")
-    elif damage == "zip of something else":
-        np.savez(path, other=np.zeros(3))
+        path.write_text("no safetensors file")
+    elif damage == "something else":
+        safetensors.numpy.save_file({"other": np.zeros(3)}, path)
     else:
         path.unlink()
         path.mkdir()
@@ -188,6 +192,110 @@ def test_folder_of_the_user(tmp_path: Path) -> None:
     assert cache_folder() == tmp_path / "cache" / "orient-eye" / "optimum"
 
 
+# --- an optimum that travels ----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def travels(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file with the optimum of the two saccades."""
+    found = find_optimum(task(), START, TARGET, np.random.default_rng(0), effort=0.3)
+    path = tmp_path_factory.mktemp("travels") / "optimum.safetensors"
+    return write_optimum(path, Found(task_key(task()), START, TARGET, found))
+
+
+def test_what_travels_is_not_searched(travels: Path, searches: list[SaccadeTask]) -> None:
+    """All of it or a part, in any order, and where another machine puts the motors."""
+    written = read_optimum(travels)
+    assert written is not None
+    moved = State(START.orientation, START.motor + 1e-9)
+    for start, which in ((START, [0, 1]), (START, [1]), (moved, [1, 0, 1])):
+        taken = searched_optimum(task(), start[which], TARGET[which], carried=travels)
+        np.testing.assert_array_equal(taken.action, written.optimum.action[which])
+        np.testing.assert_allclose(taken.reward, written.optimum.reward[which], rtol=1e-7)
+        assert taken.evaluations == written.optimum.evaluations
+    assert not searches
+    assert not optimum_cache.cache_folder().exists()
+
+
+def test_another_version_of_the_search_takes_it_too(
+    travels: Path, searches: list[SaccadeTask], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(optimum_cache, "_SEARCH", "another")
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "99")
+    searched_optimum(task(), START, TARGET, carried=travels)
+    assert not searches
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        lambda: task("2-fixed"),
+        lambda: task(weights=WEIGHTS | {"overshoot": 1e8}),
+        lambda: task(band=0.02),
+        lambda: task(plant=LinearPlant(Surrogate(1.4758, 17.6, eye="thesis"))),
+        lambda: task(plant=MujocoPlant(threads=1)),
+    ],
+)
+def test_what_travels_with_another_task_is_searched(
+    travels: Path, searches: list[SaccadeTask], other: Callable[[], SaccadeTask]
+) -> None:
+    start, target = saccades(other().targets, [[0.0], [-5.0]], [[30.0], [5.0]])
+    searched_optimum(other(), start, target, carried=travels)
+    assert len(searches) == 1
+
+
+def test_saccades_that_do_not_travel_are_searched(travels: Path, searches: list[SaccadeTask], tmp_path: Path) -> None:
+    near = saccades(task().targets, [[0.0], [-5.0]], [[30.0], [5.001]])
+    moving = State(START.orientation, START.motor, np.array([[0.0, 0, 1e-3], [0.0, 0, 0]]))
+    for start, target in (near, (moving, TARGET)):
+        searched_optimum(task(), start, target, carried=travels)
+    assert len(searches) == 2
+    searched_optimum(task(), START, TARGET, carried=tmp_path / "nothing.safetensors")
+    assert len(searches) == 3
+
+
+def test_a_reward_that_is_not_the_actions_is_found_out(
+    travels: Path, searches: list[SaccadeTask], tmp_path: Path
+) -> None:
+    """The file is whole, and of an eye that has changed since."""
+    written = read_optimum(travels)
+    assert written is not None
+    for share, count in ((1 + 1e-5, 0), (1 + 1e-3, 1), (np.nan, 1)):
+        changed = replace(written.optimum, reward=written.optimum.reward * [1, share])
+        path = write_optimum(tmp_path / f"{share}", replace(written, optimum=changed))
+        searches.clear()
+        taken = searched_optimum(task(), START, TARGET, carried=path, folder=tmp_path / f"cache-{share}")
+        assert len(searches) == count
+        if not count:
+            np.testing.assert_allclose(taken.reward, written.optimum.reward, rtol=1e-12)
+
+
+def test_a_damaged_file_that_travels_is_searched(travels: Path, searches: list[SaccadeTask], tmp_path: Path) -> None:
+    whole, path = travels.read_bytes(), tmp_path / "optimum.safetensors"
+    written = read_optimum(travels)
+    assert written is not None
+    shorter = replace(written.optimum, action=written.optimum.action[:1])
+    damages: list[Callable[[], object]] = [
+        lambda: path.write_bytes(whole[:-50]),
+        lambda: path.write_bytes(whole[:-50] + bytes([whole[-50] ^ 1]) + whole[-49:]),
+        lambda: path.write_bytes((2**60).to_bytes(8, "little") + whole[8:]),
+        lambda: safetensors.numpy.save_file({}, path, {"orient-eye": "[" * 100_000}),
+        lambda: safetensors.numpy.save_file({}, path, {"orient-eye": "[]"}),
+        lambda: write_optimum(path, replace(written, optimum=shorter)),
+        lambda: write_optimum(path, replace(written, optimum=replace(shorter, action=written.optimum.action[:, :2]))),
+    ]
+    for count, damage in enumerate(damages, start=1):
+        damage()
+        searched_optimum(task(), START, TARGET, carried=path, folder=tmp_path / f"cache-{count}")
+        assert len(searches) == count
+
+
+def test_the_same_optimum_gives_the_same_bytes(travels: Path, tmp_path: Path) -> None:
+    written = read_optimum(travels)
+    assert written is not None
+    assert write_optimum(tmp_path / "again", written).read_bytes() == travels.read_bytes()
+
+
 # --- the second search ----------------------------------------------------------------------------
 
 
@@ -200,6 +308,47 @@ def test_two_searches_agree(case: str) -> None:
     action, reward = second_search(own, start, target)
     assert reward == pytest.approx(best.reward[0], rel=1e-4)
     np.testing.assert_allclose(action, best.action[0], rtol=0.01)
+
+
+def test_two_searches_agree_on_the_simulated_eye() -> None:
+    own = task(plant=TavaresPlant())
+    start, target = saccades(own.targets, [[-15.0]], [[15.0]])
+    _, reward = second_search(own, start, target)
+    assert reward == pytest.approx(searched_optimum(own, start, target).reward[0], rel=1e-4)
+
+
+@pytest.mark.slow
+def test_two_searches_agree_in_nine_dimensions() -> None:
+    """All three motors driven; only motor2 turns the eye much, so that the optimum is flat in five numbers."""
+    own = SaccadeTask.of_case(TavaresPlant(), "1", driven=("motor1", "motor2", "motor3"), weights=WEIGHTS)
+    start, target = own.targets.draw(1, np.random.default_rng(2021))
+    assert len(own.actions.numbers) == 9
+    best = searched_optimum(own, start, target)
+    assert best.evaluations < 1300
+    _, reward = second_search(own, start, target)
+    assert reward == pytest.approx(best.reward[0], rel=1e-3)
+
+
+def test_the_whole_eye_is_searched_on_its_kernel_and_judged_by_itself() -> None:
+    """The twin is the same eye, with the same limits; what is told is the plant's own reward, and no worse for it."""
+    for options in ({}, {"gravity": True}, {"accurate": True}, {"eye": "eve_v3"}, {"rig": "prototype"}):
+        plant = MujocoPlant(**options)
+        twin = plant.twin()
+        assert isinstance(twin, TavaresPlant)
+        identity, other = plant.identity(), twin.identity()
+        assert {name: other.get(name, False) for name in plant.options} == plant.options
+        assert identity["model"] == other["model"] or options.keys() & {"gravity", "accurate"}
+        assert twin.motors == plant.motors
+        if options.keys() & {"gravity", "eye"}:  # no motor alone holds a heavy eye straight ahead
+            continue
+        own = SaccadeTask.of_case(plant, "1", weights=WEIGHTS)
+        start, target = saccades(own.targets, [[0.0]], [[12.0]])
+        found = find_optimum(own, start, target, np.random.default_rng(0), effort=0.5)
+        assert found.reward == own.perform(start, found.action, target).reward.total
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(MujocoPlant, "twin", lambda _: None)
+            alone = find_optimum(own, start, target, np.random.default_rng(0), effort=0.5)
+        assert found.reward == pytest.approx(alone.reward, rel=2e-3)
 
 
 # --- pairs ----------------------------------------------------------------------------------------
@@ -326,7 +475,7 @@ def test_check_fails_when_the_second_search_is_better(searches: list[SaccadeTask
 
 def test_command_on_the_whole_eye(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def quickly(*arguments: Any, progress: Any = None) -> Optimum:
-        return find_optimum(*arguments, population=12, generations=6, progress=progress)
+        return find_optimum(*arguments, effort=0.1, progress=progress)
 
     monkeypatch.setattr(optimum_cache, "find_optimum", quickly)
     (row,) = command("--plant", "mujoco", "--start", "-5", "--target", "10").run()["saccades"]

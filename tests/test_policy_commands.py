@@ -19,8 +19,8 @@ from orient_eye.cli.saccades import Saccades
 from orient_eye.commands.motor_file import read_command
 from orient_eye.errors import InputError
 from orient_eye.learning import figures
-from orient_eye.learning.evaluation import Yardstick
-from orient_eye.learning.policy import NAME, Policy
+from orient_eye.learning.evaluation import Yardstick, carry_optimum, evaluation_saccades
+from orient_eye.learning.policy import NAME, Policy, shipped_policies
 from orient_eye.motor import names
 from orient_eye.movement.measures import measure
 from orient_eye.plants import make_plant
@@ -246,6 +246,55 @@ def test_evaluate_holds_a_policy_against_the_optimum(folder: Path, tmp_path: Pat
     assert [row["amplitude_deg"] for row in result["table"]] == [5, 10, 20, 30, 45, 60]
     with pytest.raises(InputError, match="not an empty folder"):
         Evaluate(str(folder), pairs=3, out=tmp_path / "run", quiet=True).run()
+
+
+@pytest.mark.usefixtures("cache")
+def test_the_optimum_travels_with_a_policy(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Copied or not, with all of its saccades or some of them; on another plant it is searched."""
+    own = shutil.copytree(folder, tmp_path / "policy")
+    pairs, table = evaluation_saccades(Policy.load(own).task(), 4)
+    carry_optimum(pairs, table, own)
+    searched: list[str] = []
+
+    def find(task: SaccadeTask, start: State, target: np.ndarray, *_: object, **__: object) -> Optimum:
+        searched.append(task.plant.name)
+        action = np.tile([30.0, 10.0, 17.5], (len(target), 1))
+        return Optimum(action, np.full(len(target), -1e5), 0)
+
+    monkeypatch.setattr("orient_eye.search.optimum_cache.find_optimum", find)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "another"))
+    result = Evaluate(str(own), pairs=4, out=tmp_path / "a", quiet=True).run()
+    fewer = Evaluate(str(own / NAME), pairs=2, out=tmp_path / "b", quiet=True).run()
+    assert not searched
+    assert not (tmp_path / "another").exists()
+    assert [row["reward_best"] for row in result["table"]] == pytest.approx(list(table.optimum.reward), rel=1e-12)
+    assert (result["pairs"], fewer["pairs"]) == (4, 2)
+    with (tmp_path / "a" / "pairs.csv").open() as one, (tmp_path / "b" / "pairs.csv").open() as other:
+        assert list(csv.DictReader(one))[:2] == list(csv.DictReader(other))
+    Evaluate(str(own), pairs=5, out=tmp_path / "c", quiet=True).run()
+    surrogate = str(Surrogate(1.5, 16.0).save(tmp_path / "s.json"))
+    another = AnotherPlant("lpf", {"surrogate": surrogate}, force=True)
+    Evaluate(str(own), pairs=4, out=tmp_path / "d", another_plant=another, quiet=True).run()
+    assert len(searched) == 2
+
+
+@pytest.mark.usefixtures("cache")
+def test_evaluate_takes_as_many_saccades_as_the_training(folder: Path, tmp_path: Path) -> None:
+    policy = Policy.load(folder)
+    replace(policy, manifest={**policy.manifest, "result": {"pairs": 3}}).save(tmp_path / "policy")
+    assert Evaluate(str(tmp_path / "policy"), out=tmp_path / "run", quiet=True).run()["pairs"] == 3
+
+
+@pytest.mark.usefixtures("cache")
+@pytest.mark.parametrize("name", shipped_policies())
+def test_every_shipped_policy_has_its_optimum(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that evaluate searches nothing; `python scripts/results.py FOLDER --optimum` searches what is missing."""
+    monkeypatch.setattr("orient_eye.search.optimum_cache.find_optimum", lambda *_, **__: pytest.fail("not there"))
+    policy = Policy.load(name)
+    carried = shipped_policies()[name] / "optimum.safetensors"
+    for yardstick in evaluation_saccades(policy.task(), policy.manifest["result"]["pairs"], carried=carried):
+        _, _, gap = yardstick.perform(policy.act)
+        assert gap.min() > -1e-3  # nothing that was learned is better than what was found
 
 
 def test_evaluate_refuses_before_it_works(folder: Path, tmp_path: Path) -> None:

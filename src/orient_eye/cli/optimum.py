@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 class Optimum:
     """Search the best action for a saccade: B, D and k0 with the largest reward, on any plant.
 
-    Differential evolution over the whole box of actions. What was found is kept in the user's cache and
-    remembered when the same saccades are asked for again. --check searches once more by another program and exits
+    Simplices from the best of a sample over the whole box of actions. What was found is kept in the user's cache
+    and remembered when the same saccades are asked for again. --check searches once more by another program and exits
     with 1 when that finds something better by more than 0.1 %.
 
     $ orient-eye optimum --start 0 --target 30
@@ -54,8 +54,8 @@ class Optimum:
     def run(self) -> dict[str, Any]:
         """Search, or remember, and print the table."""
         from orient_eye.cli.places import check_outputs
-        from orient_eye.cli.tables import column, saccade_columns, say, say_limits, table, with_peaks
-        from orient_eye.task.table import outcome_rows
+        from orient_eye.cli.tables import column, saccade_columns, say, say_limits, table
+        from orient_eye.task.table import outcome_rows, with_peaks
         from orient_eye.task.targets import saccades
 
         check_outputs({"--out": self.out}, {"--pairs": self.saccades.pairs})

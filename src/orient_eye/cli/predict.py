@@ -57,11 +57,11 @@ class Predict:
     def run(self) -> dict[str, Any]:
         """Predict, write the files and print the table."""
         from orient_eye.cli.places import check_outputs, policy_file
-        from orient_eye.cli.tables import saccade_columns, say, say_limits, table, with_peaks
+        from orient_eye.cli.tables import saccade_columns, say, say_limits, table
         from orient_eye.files import write_table
         from orient_eye.learning.policy import Policy
         from orient_eye.plants.limits import wiring
-        from orient_eye.task.table import outcome_rows
+        from orient_eye.task.table import outcome_rows, with_peaks
         from orient_eye.task.targets import saccades
         from orient_eye.words import plant_in_words
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:  # --help does not wait for rich
     from rich.table import Table
     from rich.text import Text
 
-    from orient_eye.task.saccade import Outcome, SaccadeTask
+    from orient_eye.task.saccade import SaccadeTask
 
 Row: TypeAlias = Mapping[str, Any]
 Cell: TypeAlias = "str | Text"
@@ -137,34 +137,6 @@ def _beside(told: Sequence[tuple[str, str]]) -> Callable[[Row], Cell]:
         return Text("\n".join((*words, "limited")), "yellow") if row["limited"] else "\n".join(words)
 
     return cell
-
-
-def with_peaks(task: "SaccadeTask", outcome: "Outcome", rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Rows of `orient_eye.task.table.outcome_rows` with how fast and hard their motors move, and how much they can.
-
-    Args:
-        task: whose saccades they are.
-        outcome: of them.
-        rows: of the same saccades.
-    """
-    import numpy as np
-
-    from orient_eye.plants.limited_motor import peaks
-
-    motors = task.plant.motors
-    speed, acceleration = peaks(outcome.movement.trajectory().motor, task.plant.step_s)
-    driven = [i for i, motor in enumerate(motors) if motor.name in {n.motor for n in task.actions.numbers}]
-    made = [dict(row) for row in rows]
-    for i in driven:
-        name, motor = f"_{motors[i].name}" if len(driven) > 1 else "", motors[i]
-        for key, unit, values, limit in (
-            ("motor_speed", "deg_s", speed[:, i], motor.speed_limit),
-            ("motor_acceleration", "deg_s2", acceleration[:, i], motor.acceleration_limit),
-        ):
-            for row, value in zip(made, values, strict=True):
-                row[f"{key}{name}_{unit}"] = float(value) if np.isfinite(value) else None
-                row[f"{key}_limit{name}_{unit}"] = limit
-    return made
 
 
 def say_limits(task: "SaccadeTask", rows: Sequence[Row]) -> None:

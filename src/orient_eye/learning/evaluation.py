@@ -5,6 +5,7 @@ The gap of a saccade is (R* - R) / |R*|, with R* the reward of the searched opti
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.search.optimum import Optimum
-from orient_eye.search.optimum_cache import searched_optimum
+from orient_eye.search.optimum_cache import searched_optimum, task_key
+from orient_eye.search.optimum_file import NAME, Found, write_optimum
 from orient_eye.state import State
 from orient_eye.task.saccade import Outcome, SaccadeTask
 
@@ -44,10 +46,15 @@ class Yardstick:
 
     @classmethod
     def search(
-        cls, task: SaccadeTask, start: State, target: Array, progress: Callable[[float], None] | None = None
+        cls,
+        task: SaccadeTask,
+        start: State,
+        target: Array,
+        progress: Callable[[float], None] | None = None,
+        carried: Path | None = None,
     ) -> "Yardstick":
-        """Search the optimum of saccades, or remember it."""
-        return cls(task, start, target, searched_optimum(task, start, target, progress=progress))
+        """Take the optimum of saccades from a file that travels, remember it, or search it."""
+        return cls(task, start, target, searched_optimum(task, start, target, progress=progress, carried=carried))
 
     def __getitem__(self, which: slice) -> "Yardstick":
         optimum = Optimum(self.optimum.action[which], self.optimum.reward[which], self.optimum.evaluations)
@@ -65,39 +72,49 @@ class Yardstick:
         gap = (self.optimum.reward - outcome.reward.total) / np.abs(self.optimum.reward)
         return action, outcome, gap
 
-    def to_plain(self) -> dict[str, Any]:
-        """Plain values, for a run's directory; starts and targets by the angles of the task's targets."""
-        angles = self.task.targets.angles_of
-        told = {"start": angles(self.start.orientation), "target": angles(self.target)}
-        return {
-            **{
-                f"{what}_{name}": values[:, k].tolist()
-                for what, values in told.items()
-                for k, name in enumerate(self.task.targets.angles)
-            },
-            "action": self.optimum.action.tolist(),
-            "reward": self.optimum.reward.tolist(),
-            "evaluations": self.optimum.evaluations,
-        }
-
 
 def evaluation_saccades(
-    task: SaccadeTask, count: int, progress: Callable[[float], None] | None = None
+    task: SaccadeTask,
+    count: int,
+    progress: Callable[[float], None] | None = None,
+    carried: Path | None = None,
 ) -> tuple[Yardstick, Yardstick]:
     """Random saccades over the whole range, and symmetric ones of the table's amplitudes, as far as the range goes.
 
     They depend on nothing but the targets and their number, so that runs can be compared and their optimum is
-    searched once.
+    searched once. Fewer than are usual on the plant are the first of those.
+
+    Args:
+        task: plant, command and reward.
+        count: of the random ones.
+        progress: called with the share of a search that is done, where one is needed.
+        carried: file with an optimum that travels with a policy, where there is one.
     """
     targets = task.targets
-    start, target = targets.draw(count, np.random.default_rng(_SEED))
+    start, target = targets.draw(max(count, task.plant.evaluation_pairs), np.random.default_rng(_SEED))
+    start, target = start[:count], target[:count]
     angles = targets.symmetric(np.array(TABLE_AMPLITUDES_DEG))
     if not len(angles[0]):
         angles = targets.symmetric(np.array([2 * targets.limit_deg]))
     low, high = map(targets.orientation, angles)
     start = targets.rest(np.concatenate([start.orientation, low]))
-    both = Yardstick.search(task, start, np.concatenate([target, high]), progress)
+    both = Yardstick.search(task, start, np.concatenate([target, high]), progress, carried)
     return both[:count], both[count:]
+
+
+def carry_optimum(pairs: Yardstick, table: Yardstick, folder: Path) -> Path:
+    """Write the optimum of evaluation saccades beside a policy, with which it travels; returns the file."""
+    starts = [np.concatenate(part) for part in zip(*(_parts(y.start) for y in (pairs, table)), strict=True)]
+    action, reward, target = (
+        np.concatenate(part)
+        for part in zip(*((y.optimum.action, y.optimum.reward, y.target) for y in (pairs, table)), strict=True)
+    )
+    optimum = Optimum(action, reward, pairs.optimum.evaluations)
+    return write_optimum(folder / NAME, Found(task_key(pairs.task), State(*starts), target, optimum))
+
+
+def _parts(state: State) -> tuple[Array, Array, Array]:
+    return state.orientation, state.motor, state.angular_velocity
 
 
 @dataclass(frozen=True)

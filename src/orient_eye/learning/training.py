@@ -2,7 +2,7 @@
 
     result = train(TrainConfig(plant="lpf"), Path("runs/first"))
 
-The run directory holds run.json (settings, seed, versions), metrics.csv, evaluation.json (the searched optimum),
+The run directory holds run.json (settings, seed, versions), metrics.csv, optimum.safetensors (the searched optimum),
 stages/ (evaluation saccades at several stages), checkpoint.pt, policy.safetensors, result.json, learning.png,
 policy.png and recording.rrd.
 """
@@ -24,7 +24,7 @@ from orient_eye.files import remove_leftovers
 from orient_eye.learning.checkpoint import NAME as CHECKPOINT
 from orient_eye.learning.checkpoint import load_checkpoint
 from orient_eye.learning.config import TrainConfig, TrainSettings
-from orient_eye.learning.evaluation import Yardstick, amplitude_table, evaluation_saccades, gap_summary
+from orient_eye.learning.evaluation import Yardstick, amplitude_table, carry_optimum, evaluation_saccades, gap_summary
 from orient_eye.learning.loop import CHECKPOINT_S, Stop, StopRequest, TrainingLoop
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
@@ -33,6 +33,7 @@ from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperatur
 from orient_eye.plants.uncertain import uncertain
 from orient_eye.progress import progress_bar
 from orient_eye.run_directory import RunDirectory, versions
+from orient_eye.search.optimum_file import NAME as OPTIMUM
 from orient_eye.task.known_weights import bounds, compared_with_thesis
 from orient_eye.task.saccade import SaccadeTask
 
@@ -201,8 +202,9 @@ class _Run:
     def _yardsticks(self) -> tuple[Yardstick, Yardstick]:
         """Random saccades, the same for every run, and the table's amplitudes, with their searched optimum."""
         with progress_bar("searching the optimum", quiet=self.quiet) as advance:
-            pairs, table = evaluation_saccades(self.task, self.settings.evaluation_pairs, advance)
-        self.run.write_json("evaluation.json", {"pairs": pairs.to_plain(), "table": table.to_plain()})
+            path = self.run.path / OPTIMUM
+            pairs, table = evaluation_saccades(self.task, self.settings.evaluation_pairs, advance, path)
+        carry_optimum(pairs, table, self.run.path)
         return pairs, table
 
     def policy(self, model: OneStepSAC) -> Policy:

@@ -3,28 +3,61 @@
     found = find_optimum(task, start, target, np.random.default_rng(0))
     found.action, found.reward
 
-Differential evolution over the box of actions and scans along its coordinates at the end, for many saccades
-side by side, so that every step is one batch of the plant. It needs no gradient, so that neither the cliff of
-the reward in k0 (an overshoot costs decades) nor the kink of the settling time misleads it. What it knows of the
-numbers of an action stands in the task's action space.
+Simplices from the best of a sample in each basin, begun anew around what they found, for many saccades side by side,
+so that every step is one batch of the plant; in between each saccade tries what was found for those most like it. It
+needs no gradient, so that neither the cliff of the reward in k0 (an overshoot costs decades) nor the kink of the
+settling time misleads it. What it knows of the numbers of an action stands in the task's action space.
+
+A plant that has a quicker twin is searched on the twin. What is told is the plant's own reward, and where that is not
+the twin's, the search goes on on the plant.
 """
 
-import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from orient_eye.errors import InputError
+from orient_eye.search.simplex import around, climb
 from orient_eye.state import State
 from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
-_ISLANDS = 3
-_RESTARTS = {0.3: 1.0, 0.55: 0.3, 0.8: 0.1}  # share of the generations: spread around the best
-_NEAR_LIKELY = 0.003  # of a number's range: spread around a value that is likely
-_SCANS = (1.0, 0.2, 0.04, 0.008, 0.0016)  # half-widths of the scans at the end, shares of the ranges
+_SAMPLE = 40  # actions a saccade, of three numbers
+_NEAR_LIKELY = 1.5  # of a number's `fine`: spread around a value that is likely
+_APART = 1 / 6  # of a range: from there on an action is on another side of a cliff
+_LIKE = 4  # saccades whose actions are tried
+_TWINS = 1e-4  # of |R|: as far as a twin's reward may be from the plant's own
+
+
+class _Round(NamedTuple):
+    """Simplices begun anew.
+
+    Attributes:
+        simplices: a saccade, around its best actions.
+        iterations: of actions of three numbers.
+        step: to the simplex' other corners, in units of a number's `fine`.
+        along: as the last simplex lies, larger: where that has found a ridge, the new one goes along it.
+    """
+
+    simplices: int
+    iterations: int
+    step: float
+    along: bool = False
+
+
+_ROUNDS = (
+    _Round(5, 20, 5.0),
+    _Round(2, 40, 2.0),
+    _Round(1, 40, 6.0, along=True),
+    _Round(1, 40, 3.0, along=True),
+    _Round(1, 30, 1.0),
+    _Round(1, 30, 0.3),
+)
+_ACROSS = 0.05  # of its step, by which one along a ridge is wide
 
 
 @dataclass(frozen=True)
@@ -34,7 +67,7 @@ class Optimum:
     Attributes:
         action: in units, (saccades, numbers).
         reward: their total reward, (saccades,).
-        evaluations: how many saccades the search performed.
+        evaluations: how many saccades the search performed, on the plant and its twin.
     """
 
     action: Array
@@ -48,8 +81,7 @@ def find_optimum(
     target: Array,
     random: np.random.Generator,
     *,
-    population: int = 48,
-    generations: int = 60,
+    effort: float = 1.0,
     progress: Callable[[float], None] | None = None,
 ) -> Optimum:
     """Search the best action of each saccade.
@@ -59,95 +91,167 @@ def find_optimum(
         start: where each saccade begins, of (saccades,).
         target: desired orientations, (saccades, 4).
         random: generator of the search.
-        population: candidates a saccade, a multiple of 3.
-        generations: of the search.
+        effort: times the usual number of saccades; with more of them it finds what few find.
         progress: called with the share of the work done, 0 to 1.
+
+    Raises:
+        InputError: an effort that is none.
     """
-    if population % _ISLANDS or population < 4 * _ISLANDS:
-        raise InputError(f"the population must be a multiple of {_ISLANDS}, at least {4 * _ISLANDS}, got {population}")
-    saccades, actions = len(target), task.actions
-    size = len(actions.numbers)
-    rows = np.repeat(np.arange(saccades), population)
-    many_starts, many_targets = start[rows], target[rows]
-
-    def judge(candidates: Array) -> Array:
-        many = actions.from_unit(2 * candidates.reshape(-1, size) - 1)
-        return task.perform(many_starts, many, many_targets).reward.total.reshape(saccades, population)
-
-    x = _spread(random, (saccades, population, size))
-    # Most candidates have likely numbers (D: they end near the target): the rest of the search is about the others.
-    likely = (actions.to_unit(actions.likely(target)) + 1) / 2
-    known = np.isfinite(likely).all(axis=0)
-    near = random.normal(likely[:, None, known], _NEAR_LIKELY, (saccades, population, int(known.sum())))
-    anywhere = (np.arange(population) // _ISLANDS % 6 == 5)[:, None]
-    x[..., known] = np.where(anywhere, x[..., known], np.clip(near, 0, 1))
-    # Islands begin in one stratum of a number with a cliff (k0) each and breed only among themselves: the basins on
-    # both sides of the cliff stay alive. Each begins anew around its best candidate, closer every time, so that one
-    # that settled too early moves on.
-    island = np.arange(population) % _ISLANDS
-    cliff = np.array([number.cliff for number in actions.numbers])
-    x[..., cliff] = (x[..., cliff] + island[:, None]) / _ISLANDS
-    value = judge(x)
-    mates = np.array([np.flatnonzero(island == i) for i in island])
-    each, columns = np.arange(saccades)[:, None], np.arange(population)
-    restarts = {round(share * generations): spread for share, spread in _RESTARTS.items()}
-    rounds = generations + len(_SCANS) * size
-    fine = np.array([number.fine for number in actions.numbers])
-    for generation in range(generations):
-        if progress:
-            progress((generation + 1) / rounds)
-        best = np.take_along_axis(mates[None], value[:, mates].argmax(axis=2)[..., None], axis=2)[..., 0]
-        if generation in restarts:
-            closer = fine * restarts[generation]
-            moved = np.clip(x[each, best] + random.normal(size=x.shape) * closer, 0, 1)
-            x = np.where((best == columns)[..., None], x, moved)
-            value = judge(x)
-            continue
-        chosen = random.integers(mates.shape[1], size=(2, saccades, population))
-        one, two = mates[columns, chosen[0]], mates[columns, chosen[1]]
-        # "current to best / 1 / bin", with a scale drawn anew for each candidate.
-        scale = random.uniform(0.3, 0.9, (saccades, population, 1))
-        mutant = np.clip(x + scale * (x[each, best] - x) + scale * (x[each, one] - x[each, two]), 0, 1)
-        crossed = random.random(x.shape) < 0.9
-        crossed[each, columns, random.integers(size, size=(saccades, population))] = True
-        trial = np.where(crossed, mutant, x)
-        trial_value = judge(trial)
-        better = trial_value >= value
-        x, value = np.where(better[..., None], trial, x), np.where(better, trial_value, value)
-    x, value = _scan(x, value, judge, lambda done: progress and progress((generations + done) / rounds))
-    winner = value.argmax(axis=1)
-    action = actions.from_unit(2 * x[np.arange(saccades), winner] - 1)
-    return Optimum(action, value.max(axis=1), saccades * population * (rounds + 1))
+    if not 0 < effort < np.inf:
+        raise InputError(f"the effort of a search is a number above 0, 1 for the usual one, got {effort}")
+    twin = task.plant.twin()
+    search = _Search(task if twin is None else replace(task, plant=twin), start, target, random, effort, progress)
+    x, value = search.run()
+    performed = search.performed
+    if twin is not None:
+        own = _Search(task, start, target, random, effort)
+        own_value = own.judge(x[:, None])[:, 0]
+        performed += own.performed
+        # Where the twin is not quite this eye its best may lie beyond a cliff: there the plant itself goes on.
+        off = np.flatnonzero(np.abs(own_value - value) > _TWINS * np.abs(own_value))
+        value = own_value
+        if len(off):
+            own = _Search(task, start[off], target[off], random, effort)
+            x[off], value[off] = own.go_on(x[off], own_value[off])
+            performed += own.performed
+    return Optimum(task.actions.from_unit(2 * x - 1), value, performed)
 
 
-def _scan(
-    x: Array, value: Array, judge: Callable[[Array], Array], progress: Callable[[int], object]
-) -> tuple[Array, Array]:
-    """Scan from the best candidates along one coordinate at a time, the widest scans first.
+class _Search:
+    """One search. Actions are in the unit box; those of a saccade are (saccades, actions, numbers)."""
 
-    The way out where all islands have settled in a basin that is not the best.
+    def __init__(
+        self,
+        task: SaccadeTask,
+        start: State,
+        target: Array,
+        random: np.random.Generator,
+        effort: float,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        self.task, self.start, self.target, self.random, self.progress = task, start, target, random, progress
+        numbers = task.actions.numbers
+        self.saccades, self.size, self.performed = len(target), len(numbers), 0
+        self.fine = np.array([number.fine for number in numbers])
+        cliff = np.array([number.cliff for number in numbers])
+        self.cliff = cliff if cliff.any() else ~cliff
+        self.effort = effort * (self.size / 3) ** 0.5
+        self.left = self.rounds = sum(self._iterations(each) for each in _ROUNDS)
 
-    Args:
-        x: candidates in the unit box, (saccades, population, size).
-        value: of the candidates, (saccades, population).
-        judge: gives the value of candidates.
-        progress: called with the number of scans done.
+    def _iterations(self, each: _Round) -> int:
+        return max(1, round(each.iterations * self.effort))
 
-    Returns:
-        The candidates of the last scan and their values.
-    """
-    _, population, size = x.shape
-    offsets = np.concatenate([[0.0], np.linspace(-1, 1, population - 1)])
-    for done, (width, coordinate) in enumerate(itertools.product(_SCANS, range(size)), start=1):
-        x = np.repeat(np.take_along_axis(x, value.argmax(axis=1)[:, None, None], axis=1), population, axis=1)
-        x[..., coordinate] = np.clip(x[..., coordinate] + width * offsets, 0, 1)
-        value = judge(x)
-        progress(done)
-    return x, value
+    def run(self) -> tuple[Array, Array]:
+        """The best actions (saccades, numbers) and their values."""
+        # Most candidates have likely numbers (D: they end near the target): the search is about the others.
+        likely = (self.task.actions.to_unit(self.task.actions.likely(self.target)) + 1) / 2
+        known = np.asarray(np.isfinite(likely).all(axis=0))
+        usual, every = np.where(known, likely, 0.0), np.arange(self.saccades)
+        alike = self._alike()
+        best, value = self._basins(*self._sample(usual, known), _ROUNDS[0].simplices)
+        last = best[:, :1]
+        for i, each in enumerate(_ROUNDS):
+            if i and alike.shape[1]:
+                # What is best for others is best here as a difference from what is usual there.
+                tried = np.clip((best[:, 0] - usual)[alike] + usual[:, None], 0, 1)
+                best, value = _merged(best, value, tried, self.judge(tried))
+            simplices = min(each.simplices, best.shape[1])
+            points, values = self._climb(self._simplices(best[:, :simplices], last, each), each)
+            last = points[every, values[:, :, 0].argmax(axis=1)]
+            best, value = _best_first(points[:, :, 0], values[:, :, 0])
+        return best[:, 0], value[:, 0]
+
+    def go_on(self, x: Array, value: Array) -> tuple[Array, Array]:
+        """Better actions (saccades, numbers) near such ones, and their values; as good ones at least."""
+        best, value = x[:, None], value[:, None]
+        for each in _ROUNDS[-2:]:
+            points, values = self._climb(self._simplices(best, best, each), each)
+            best, value = points[:, :, 0], values[:, :, 0]
+        return best[:, 0], value[:, 0]
+
+    def judge(self, actions: Array) -> Array:
+        """Rewards (saccades, actions)."""
+        rows = np.repeat(np.arange(self.saccades), actions.shape[1])
+        return self._perform(actions.reshape(-1, self.size), rows).reshape(self.saccades, -1)
+
+    def _perform(self, actions: Array, rows: NDArray[np.intp]) -> Array:
+        self.performed += len(rows)
+        units = self.task.actions.from_unit(2 * actions - 1)
+        return self.task.perform(self.start[rows], units, self.target[rows]).reward.total
+
+    def _sample(self, usual: Array, known: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Actions all over the box, but for numbers that are likely, and their values."""
+        count = max(_ROUNDS[0].simplices, round(_SAMPLE * self.effort))
+        shape = (self.saccades, count, self.size)
+        cells = self.random.permuted(np.broadcast_to(np.arange(count)[:, None], shape), axis=1)
+        x = (cells + self.random.random(shape)) / count
+        near = usual[:, None] + _NEAR_LIKELY * self.fine * self.random.normal(size=shape)
+        x = np.where(known, np.clip(near, 0, 1), x)
+        return x, self.judge(x)
+
+    def _basins(self, x: Array, value: Array, count: int) -> tuple[Array, Array]:
+        """The best action, then each time the best on another side of a cliff (without one, elsewhere)."""
+        each, left, chosen = np.arange(self.saccades), value.copy(), []
+        for _ in range(count):
+            chosen.append(left.argmax(axis=1))
+            off = np.abs(x - x[each, chosen[-1]][:, None])[..., self.cliff]
+            left[(off < _APART).all(axis=2)] = -np.inf
+        which = np.stack(chosen, axis=1)
+        return x[each[:, None], which], value[each[:, None], which]
+
+    def _alike(self) -> NDArray[np.intp]:
+        """For each saccade those with the nearest starts and targets, (saccades, a few)."""
+        ends = [q * np.where(q[:, :1] < 0, -1, 1) for q in (self.start.orientation, self.target)]
+        places = np.concatenate(ends, axis=1)
+        places_of_others = list(range(2, min(_LIKE + 1, self.saccades) + 1))  # the first is the saccade itself
+        if not places_of_others:
+            return np.empty((self.saccades, 0), int)
+        return np.asarray(cKDTree(places).query(places, places_of_others)[1])
+
+    def _simplices(self, best: Array, last: Array, each: _Round) -> Array:
+        """Simplices (saccades, simplices, numbers + 1, numbers) around actions (saccades, simplices, numbers).
+
+        Args:
+            best: the actions.
+            last: of each saccade the best simplex before, (saccades, numbers + 1, numbers).
+            each: how large and where along.
+        """
+        saccades, simplices, size = best.shape
+        steps = each.step * self.fine
+        points = around(best.reshape(-1, size), steps, self.random).reshape(saccades, simplices, size + 1, size)
+        if not each.along:
+            return points
+        lies = last[:, None] - last[:, None, :1]
+        long = np.abs(lies / steps).max(axis=(2, 3), keepdims=True)
+        along = best[:, :, None] + lies / np.maximum(long, 1e-9) + _ACROSS * (points - points[:, :, :1])
+        return np.clip(along, 0, 1)
+
+    def _climb(self, points: Array, each: _Round) -> tuple[Array, Array]:
+        """Simplices (saccades, simplices, numbers + 1, numbers) uphill, and their values."""
+        saccades, simplices, corners, size = points.shape
+        points, values = climb(
+            lambda x, which: self._perform(x, which // simplices),
+            points.reshape(-1, corners, size),
+            self._iterations(each),
+            self._advance,
+        )
+        return points.reshape(saccades, simplices, corners, size), values.reshape(saccades, simplices, corners)
+
+    def _advance(self) -> None:
+        self.left -= 1
+        if self.progress:
+            self.progress(1 - self.left / self.rounds)
 
 
-def _spread(random: np.random.Generator, shape: tuple[int, int, int]) -> Array:
-    """Latin hypercube samples in the unit box, one design a saccade."""
-    saccades, population, size = shape
-    cells = random.permuted(np.broadcast_to(np.arange(population)[:, None], (saccades, population, size)), axis=1)
-    return (cells + random.random(shape)) / population
+def _best_first(x: Array, value: Array) -> tuple[Array, Array]:
+    order = np.argsort(-value, axis=1, kind="stable")
+    return np.take_along_axis(x, order[..., None], axis=1), np.take_along_axis(value, order, axis=1)
+
+
+def _merged(x: Array, value: Array, others: Array, their_value: Array) -> tuple[Array, Array]:
+    """Actions with the best of others put first, where that is better than all of them."""
+    winner, each = their_value.argmax(axis=1), np.arange(len(x))
+    best = their_value[each, winner]
+    wins = best > value[:, 0]
+    value = np.concatenate([np.where(wins, best, -np.inf)[:, None], value], axis=1)
+    return _best_first(np.concatenate([others[each, winner][:, None], x], axis=1), value)

@@ -1,14 +1,19 @@
-"""Searched optima, kept on disk: a search on the MuJoCo eye takes minutes, and its answer never changes.
+"""Searched optima that are not searched again: taken along with a policy, or kept on disk.
 
-One .npz file a search, named by the hash of everything its answer depends on: plant, pulse, reward,
-bounds, saccades, the search itself and the version of orient-eye. Delete the folder at any time.
+An optimum that travels is bound to plant, actions, reward and saccades (`task_key`, and the saccades in its file), not
+to a version of orient-eye or of the search: a later search may end a hair beside it, and is not worth its time. What
+a version changes in the eye shows in the rewards: those of the actions in the file are told anew, and where they are
+not what the file says, the optimum is searched.
+
+The cache is the user's, and what it forgets costs only time: one file a search, named by the hash of everything its
+answer depends on, the search itself and the version of orient-eye among it. Delete the folder at any time.
 """
 
 import contextlib
 import hashlib
 import json
-import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -18,19 +23,25 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
 from orient_eye.errors import InputError
-from orient_eye.files import write_atomically
 from orient_eye.search.optimum import Optimum, find_optimum
+from orient_eye.search.optimum_file import Found, read_optimum, write_optimum
 from orient_eye.state import State
 from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
-_SEARCH = "differential evolution 3"  # changes when the search does
+_SEARCH = "simplices 1"  # changes when the search does
 _SEED = 20_210
+_STILL = 1e-4  # of |R|: as far as a reward may be from the one in a file that travelled
 
 
 def cache_folder() -> Path:
     """Where optima are kept: the user's cache folder (the variable XDG_CACHE_HOME moves it)."""
     return user_cache_path("orient-eye") / "optimum"
+
+
+def task_key(task: SaccadeTask) -> str:
+    """Hash of plant, actions and reward: all that an optimum depends on but the saccades."""
+    return _hash({name: value for name, value in task.identity().items() if name != "targets"})
 
 
 def searched_optimum(
@@ -40,6 +51,7 @@ def searched_optimum(
     *,
     progress: Callable[[float], None] | None = None,
     folder: Path | None = None,
+    carried: Path | None = None,
 ) -> Optimum:
     """The best actions of saccades, searched once.
 
@@ -49,29 +61,49 @@ def searched_optimum(
         target: desired orientations, (saccades, 4).
         progress: called with the share of the work done, when there is any.
         folder: of the cache; None for `cache_folder()`.
+        carried: a file that travels with a policy, where there is one: it is looked into first.
     """
+    taken = None if carried is None else carried_optimum(carried, task, start, target)
+    if taken is not None:
+        return taken
     key = {
         "search": _SEARCH,
         "version": metadata.version("orient-eye"),
-        "task": {name: value for name, value in task.identity().items() if name != "targets"},
+        "task": task_key(task),
         "start": start.to_plain(),
         "target": target.tolist(),
     }
-    name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
-    path = (folder or cache_folder()) / f"{name}.npz"
-    kept = _read(path)
+    path = (folder or cache_folder()) / f"{_hash(key)[:24]}.safetensors"
+    kept = read_optimum(path)
     if kept is not None:
-        return kept
+        return kept.optimum
     found = find_optimum(task, start, target, np.random.default_rng(_SEED), progress=progress)
-    arrays: dict[str, Any] = {"action": found.action, "reward": found.reward, "evaluations": found.evaluations}
     with contextlib.suppress(InputError):  # a folder that cannot be written costs the next search, nothing else
-        write_atomically(path, lambda temporary: np.savez(temporary, **arrays))
+        write_optimum(path, Found(task_key(task), start, target, found))
     return found
 
 
-def _read(path: Path) -> Optimum | None:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return Optimum(file["action"], file["reward"], int(file["evaluations"]))
-    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile):  # damaged: search again
+def carried_optimum(path: Path, task: SaccadeTask, start: State, target: Array) -> Optimum | None:
+    """The optimum of saccades from a file that travels, with the rewards that its actions have now.
+
+    Args:
+        path: of the file.
+        task: plant, command and reward.
+        start: where each saccade begins, of (saccades,).
+        target: desired orientations, (saccades, 4).
+
+    Returns:
+        None where there is no such file, or it is of another task, lacks one of the saccades, or tells a reward that
+        its action does not have.
+    """
+    found = read_optimum(path)
+    optimum = None if found is None or found.key != task_key(task) else found.of(start, target)
+    if optimum is None or optimum.action.shape != (len(target), len(task.actions.numbers)):
         return None
+    reward = task.perform(start, optimum.action, target).reward.total
+    still = np.abs(reward - optimum.reward) <= _STILL * np.abs(optimum.reward)
+    return replace(optimum, reward=reward) if still.all() else None
+
+
+def _hash(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

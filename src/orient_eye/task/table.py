@@ -1,10 +1,12 @@
 """An outcome as a table: one row a saccade, plain values. Everything that lists saccades asks here."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.plants.limited_motor import peaks
 from orient_eye.state import State
 from orient_eye.task.judge import plain_reward
 from orient_eye.task.saccade import Outcome, SaccadeTask
@@ -65,6 +67,30 @@ def outcome_rows(
 ) -> list[dict[str, Any]]:
     """`outcome_columns` as rows."""
     return rows_of(outcome_columns(task, start, target, action, outcome))
+
+
+def with_peaks(task: SaccadeTask, outcome: Outcome, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of `outcome_rows` with how fast and hard their motors move, and how much they can.
+
+    Args:
+        task: whose saccades they are.
+        outcome: of them.
+        rows: of the same saccades.
+    """
+    motors = task.plant.motors
+    speed, acceleration = peaks(outcome.movement.trajectory().motor, task.plant.step_s)
+    driven = [i for i, motor in enumerate(motors) if motor.name in {n.motor for n in task.actions.numbers}]
+    made = [dict(row) for row in rows]
+    for i in driven:
+        name, motor = f"_{motors[i].name}" if len(driven) > 1 else "", motors[i]
+        for key, unit, values, limit in (
+            ("motor_speed", "deg_s", speed[:, i], motor.speed_limit),
+            ("motor_acceleration", "deg_s2", acceleration[:, i], motor.acceleration_limit),
+        ):
+            for row, value in zip(made, values, strict=True):
+                row[f"{key}{name}_{unit}"] = float(value) if np.isfinite(value) else None
+                row[f"{key}_limit{name}_{unit}"] = limit
+    return made
 
 
 def _angles(what: str, names: tuple[str, ...], values: Array) -> dict[str, Array]:
