@@ -40,7 +40,7 @@ check: $(INSTALLED)
 	$(BIN)/mypy
 
 rigs: $(INSTALLED)
-	RIGS=10 $(BIN)/python -m pytest -n 2 tests/test_rigs.py
+	RIGS=10 $(BIN)/python -m pytest -n 2 -rP tests/test_rigs.py
 
 bench: $(INSTALLED)
 	$(BIN)/python benchmarks/plants.py

@@ -5,6 +5,7 @@ ten of each.
 """
 
 import csv
+import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -103,6 +104,8 @@ def test_from_recorded_steps_to_a_command_that_a_true_rig_performs(kind: str, se
     state, wanted = saccades(task.targets, start[:, None], target[:, None])
     action = Policy.load(run).act(state.orientation, wanted)
     predicted = task.perform(state, action, wanted).movement.measure(0.02).settling_time_s
+    result = json.loads((run / "result.json").read_text())
+    worst = np.zeros(3)
     left_open = rig.K * rig.play
     failures = []
     for k, (time, motor) in enumerate(commands(rig, run, start, target)):
@@ -112,6 +115,7 @@ def test_from_recorded_steps_to_a_command_that_a_true_rig_performs(kind: str, se
         overshoot = ((eye - eye[-1]) * np.sign(way)).max() / abs(way)
         outside = np.abs(eye - eye[-1]) > 0.02 * abs(way) + left_open / 2
         settling = at[np.flatnonzero(outside)[-1] + 1]
+        worst = np.maximum(worst, [error, overshoot, settling / predicted[k]])
         told = f"{start[k]:g} to {target[k]:g} deg"
         if error > max(0.5, 0.03 * size) + left_open:
             failures.append(f"{told}: ends {error:.2f} deg off")
@@ -121,4 +125,8 @@ def test_from_recorded_steps_to_a_command_that_a_true_rig_performs(kind: str, se
             failures.append(f"{told}: settles in {1e3 * settling:.0f} ms, predicted {1e3 * predicted[k]:.0f}")
         if not fast_enough(rig, time, motor):
             failures.append(f"{told}: breaks a limit of the motor")
+    print(
+        f"{rig.name}: gap {result['gap_mean']:.1%}; at worst {worst[0]:.2f} deg off, overshoot {worst[1]:.1%}, "
+        f"settles in {worst[2]:.2f} of what was predicted"
+    )
     assert not failures, f"{rig}: {failures}"
