@@ -4,14 +4,15 @@
     python benchmarks/learning.py --profile [--plant mujoco] [--profile-updates 800]
 
 The first prints a row for every step from stock Stable-Baselines3 SAC to OneStepSAC: same environment, networks
-128-128-32, a replay buffer of 8192 saccades, blocks of updates in turn, ratios within one round. The autograd twin
-makes the same updates as ours, by torch's autograd (docs/decisions/0003-networks-by-hand.md). Denormal numbers come
-late in a training: Adam's moments of a unit that is silent shrink at every update and stick at the smallest numbers
-there are, where a processor can be slow. So for the rows "a third silent" so many units are silenced, and their moments
-shrunk as 8000 updates would; what that does to Adam's steps alone stands below the table. Then come threads, twin
-critics and, on another device, the CPU; the last line is the time of the matrix products alone that one update of ours
-needs. Threads of torch wait badly: measure on a machine with nothing else to do, or with --cpu-time, and then read the
-rows of one thread only.
+128-128-32, 8192 saccades in the replay buffer, learning rate, temperature and Adam's second moment as `orient-eye
+train` has them (stock SAC keeps its own of the last two), blocks of updates in turn, ratios within one round. The
+autograd twin makes the same updates as ours, by torch's autograd (docs/decisions/0003-networks-by-hand.md). Denormal
+numbers come late in a training: Adam's moments of a unit that is silent shrink at every update and stick at the
+smallest numbers there are, where a processor can be slow. So for the rows "a third silent" so many units are silenced,
+and their moments shrunk as all updates of a training would; what that does to Adam's steps alone stands below the
+table. Then come threads, twin critics and, on another device, the CPU; the last line is the time of the matrix products
+alone that one update of ours needs. Threads of torch wait badly: measure on a machine with nothing else to do, or with
+--cpu-time, and then read the rows of one thread only.
 
 The second makes a real training in a fresh cache (`orient_eye.learning.training.train`) and says where its CPU time
 goes; with the part that grows with the updates multiplied, also where that of a whole training goes.
@@ -38,13 +39,17 @@ from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch import Tensor, nn
 
 from orient_eye.environments.sb3_env import SaccadeVecEnv
+from orient_eye.learning.config import TrainConfig
 from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 
 NETS = [128, 128, 32]
 STOCK, DEFAULT = "stock SB3 SAC, 2 critics", "denormals flushed: OneStepSAC, the default"
-FADING, SILENT = 8000, 3  # updates in which moments fade; one unit in so many is silent
+SETTINGS = TrainConfig().resolved()
+FALLING = falling_temperature(*cast(tuple[float, float], SETTINGS.temperature))
+BETAS = (0.9, SETTINGS.second_moment)
+SILENT = 3  # one unit in so many
 
 
 class OneStepTarget(SAC):
@@ -181,21 +186,22 @@ class Contestant:
 def the_way(env: SaccadeVecEnv, batch: int, device: str) -> dict[str, Contestant]:
     """From stock to ours, one torch thread: each row is the one before with one thing more."""
     same = common(batch, device)
-    plain: dict[str, Any] = {"ent_coef": 1.0, "policy_kwargs": {"net_arch": NETS}}
-    one_critic = {**plain, "policy_kwargs": {"net_arch": NETS, "n_critics": 1}}
-    stock_buffer = {**alike(1), "policy_kwargs": {**alike(1)["policy_kwargs"], "optimizer_kwargs": {}}}
+    nets = {"net_arch": NETS, "optimizer_kwargs": {"betas": BETAS}}
+    plain: dict[str, Any] = {"ent_coef": FALLING(1.0), "policy_kwargs": nets}
+    one_critic = {**plain, "policy_kwargs": {**nets, "n_critics": 1}}
+    stock_buffer = unfused()
     del stock_buffer["replay_buffer_class"]
     rows: dict[str, SAC] = {
         STOCK: SAC("MlpPolicy", env, policy_kwargs={"net_arch": NETS}, **same),
         "no next state: no target, one pass": OneStepTarget("MlpPolicy", env, **plain, **same),
         "one critic": OneStepTarget("MlpPolicy", env, **one_critic, **same),
         "gaze features once a batch, density by formula": AutogradTwin(
-            "MlpPolicy", env, ent_coef=1.0, **stock_buffer, **same
+            "MlpPolicy", env, ent_coef=FALLING(1.0), **stock_buffer, **same
         ),
-        "a buffer of rows": AutogradTwin("MlpPolicy", env, ent_coef=1.0, **unfused(), **same),
-        "fused Adam: the autograd twin": AutogradTwin("MlpPolicy", env, ent_coef=1.0, **alike(1), **same),
-        "passes by hand": ByHand("MlpPolicy", env, temperature=falling_temperature(), **alike(1), **same),
-        "one vector": ByHandInOneVector("MlpPolicy", env, temperature=falling_temperature(), **alike(1), **same),
+        "a buffer of rows": AutogradTwin("MlpPolicy", env, ent_coef=FALLING(1.0), **unfused(), **same),
+        "fused Adam: the autograd twin": AutogradTwin("MlpPolicy", env, ent_coef=FALLING(1.0), **alike(1), **same),
+        "passes by hand": ByHand("MlpPolicy", env, temperature=FALLING, **alike(1), **same),
+        "one vector": ByHandInOneVector("MlpPolicy", env, temperature=FALLING, **alike(1), **same),
     }
     found = {name: Contestant(model) for name, model in rows.items()}
     found["one head"] = Contestant(ours(env, 1, batch, device), denormals=True)
@@ -206,7 +212,7 @@ def the_way(env: SaccadeVecEnv, batch: int, device: str) -> dict[str, Contestant
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description="Speed of the learning.")
-    parser.add_argument("--batch", type=int, default=512)
+    parser.add_argument("--batch", type=int, default=SETTINGS.batch_size)
     parser.add_argument("--updates", type=int, default=200, help="a block")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--device", default="cpu")
@@ -285,7 +291,7 @@ def fade(model: SAC, batch: int) -> None:
                 still = parameter.grad == 0
                 for name, decay in zip(("exp_avg", "exp_avg_sq"), part.optimizer.param_groups[0]["betas"], strict=True):
                     moment = torch.where(state[name][still] == 0, 1e-8, state[name][still])
-                    for _ in range(FADING if name == "exp_avg" else 20 * FADING):
+                    for _ in range(SETTINGS.updates):
                         moment.mul_(decay)
                     state[name][still] = moment
 
@@ -310,12 +316,18 @@ def denormal(model: SAC) -> float:
 
 def common(batch: int, device: str) -> dict[str, Any]:
     """What all contestants have alike."""
-    return {"buffer_size": 300_000, "batch_size": batch, "seed": 0, "device": device, "learning_rate": 1e-3}
+    return {
+        "buffer_size": SETTINGS.replay_size,
+        "batch_size": batch,
+        "seed": 0,
+        "device": device,
+        "learning_rate": SETTINGS.learning_rate,
+    }
 
 
 def ours(env: SaccadeVecEnv, critics: int, batch: int, device: str) -> OneStepSAC:
     """Ours, as `orient-eye train` makes it."""
-    return OneStepSAC("MlpPolicy", env, temperature=falling_temperature(), **alike(critics), **common(batch, device))
+    return OneStepSAC("MlpPolicy", env, temperature=FALLING, **alike(critics), **common(batch, device))
 
 
 def alike(critics: int) -> dict[str, Any]:
@@ -323,14 +335,14 @@ def alike(critics: int) -> dict[str, Any]:
     policy = {"net_arch": NETS, "features_extractor_class": GazeFeatures, "n_critics": critics}
     return {
         "replay_buffer_class": OneStepReplayBuffer,
-        "policy_kwargs": {**policy, "optimizer_kwargs": {"fused": True}},
+        "policy_kwargs": {**policy, "optimizer_kwargs": {"fused": True, "betas": BETAS}},
     }
 
 
 def unfused() -> dict[str, Any]:
     """What ours and its twin have alike, but for the optimizer."""
     settings = alike(1)
-    settings["policy_kwargs"]["optimizer_kwargs"] = {}
+    settings["policy_kwargs"]["optimizer_kwargs"] = {"betas": BETAS}
     return settings
 
 
@@ -441,12 +453,11 @@ def profile(plant: str, updates: int) -> None:
 def train_watched(plant: str, updates: int, out: Path) -> tuple[Stopwatch, int]:
     """A training with a stopwatch, and how many updates it has where nobody says."""
     from orient_eye.learning import figures, stages, training
-    from orient_eye.learning.config import TrainConfig
     from orient_eye.learning.loop import TrainingLoop
     from orient_eye.learning.policy import Policy
 
     watch, learning = Stopwatch(), [False]
-    whole = TrainConfig(plant=plant).resolved().updates
+    whole = SETTINGS.updates
     update = OneStepSAC.train
 
     def and_say(*args: Any, **keywords: Any) -> None:

@@ -4,9 +4,9 @@
     python scripts/results.py runs/results --plants lpf --cases 1 --seeds 0
 
 Every run is `orient-eye train` with its defaults, from an empty cache; what is learned on `tavares` is judged on
-`mujoco`. Prints the tables of README.md and docs/learning.md; with --write puts them there, and with --ship the best run
-of each case into models/policies. The searched optimum travels with a shipped policy; --optimum fills in what is missing
-or no longer true.
+`mujoco`. Prints the tables of README.md and docs/learning.md; with --write puts them there, and with --ship the best
+run of each case into models/policies. The searched optimum travels with a shipped policy; --optimum fills in what is
+missing or no longer true.
 """
 
 import concurrent.futures

@@ -411,7 +411,9 @@ def test_without_numba_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) 
         InputError, match=r"'tavares' is compiled by Numba, .*pip install numba, or take plant 'mujoco'"
     ):
         make_plant("tavares")
-    assert make_plant("mujoco").name == "mujoco"
+    plant = make_plant("mujoco")
+    with pytest.warns(UserWarning, match=r"searched on MuJoCo itself.*pip install numba"):
+        assert plant.twin() is None
 
 
 def doubled(x: Array) -> None:

@@ -114,7 +114,7 @@ def still(count: int, samples: int) -> tuple[Sampled, State]:
 
 
 def test_the_compiled_plant_makes_at_least_three_times_mujocos_steps(tasks: dict[str, SaccadeTask]) -> None:
-    """Seventeen times on an idle machine (`benchmarks/plants.py`)."""
+    """With a wide margin: how many times it is, docs/performance.md says."""
     command, start = still(30, 501)
     compiled, mujoco = least_cpu_s(
         *(lambda name=name: tasks[name].plant.move(command, start) for name in ("tavares", "mujoco"))

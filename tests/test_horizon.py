@@ -113,6 +113,29 @@ def test_nothing_is_to_be_gained_behind_the_horizon(name: str) -> None:
         assert (reward <= worth + limit * abs(worth)).all()
 
 
+@pytest.mark.parametrize("name", ["tavares", "mujoco"])
+def test_a_saccade_within_its_band_that_is_farthest_beyond_its_end_later(name: str) -> None:
+    """20 deg: within 1 % of its end for good at 144 ms, farthest beyond it at 237 ms, which costs a third of R."""
+    plant = plant_of(name)
+    F, D = np.zeros((2, 1, 3))
+    F[:, 1], D[:, 1] = plant.hold(from_yaw([-10.0, 10.0]), ("motor2",))[:, 1]
+    command = PulseStep(F, np.full_like(F, 43.7), D, np.full_like(F, 17.6))
+    start = State(plant.rest(F), F)
+    movement = plant.move(command, start, 2.0)
+    found, (_, worth) = movement.measure(), moved(plant, command, start, 2.0)
+    yaw = to_euler(movement.trajectory().orientation)[0][0]
+    assert found.settling_time_s[0] == pytest.approx(0.144, abs=1e-3)
+    assert plant.step_s * yaw.argmax() == pytest.approx(0.237, abs=2e-3)
+    early, reward = moved(plant, command, start, 0.15)
+    assert early.overshoot[0] == pytest.approx(yaw.max() / 20 - 0.5, rel=0.01)
+    np.testing.assert_allclose(reward, worth, rtol=1e-6)
+    cut = plant.move(command, start, 0.15)
+    hidden = measure(cut.trajectory(), plant.rest(D))
+    assert hidden.overshoot[0] == 0
+    blind = JUDGES["orientation"].reward(cut, hidden, plant.rest(D * 1.002), WEIGHTS).total
+    assert (worth < 1.3 * blind).all()
+
+
 @pytest.mark.parametrize("name", ["tavares", "tavares rig", "mujoco"])
 def test_a_saccade_does_not_depend_on_its_batch(name: str) -> None:
     """Some go on, others do not, each for as long as it has to."""

@@ -1,5 +1,6 @@
-"""Parameters of the MJCF from recordings: made by the NumPy simulator of the thesis, found again through MuJoCo."""
+"""Parameters of the MJCF from recordings: made by plant `tavares`, found again through MuJoCo."""
 
+import functools
 import json
 import shutil
 from collections.abc import Sequence
@@ -14,9 +15,14 @@ from numpy.typing import NDArray
 from orient_eye.cli.sysid_physical import physical
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import build_model
+from orient_eye.learning import evaluation
+from orient_eye.learning.config import TrainConfig
+from orient_eye.learning.policy import Policy
+from orient_eye.learning.training import train
 from orient_eye.plants import make_plant
 from orient_eye.resources import data_folder
 from orient_eye.rig import Rig, RigMotor
+from orient_eye.search.optimum import find_optimum
 from orient_eye.state import State
 from orient_eye.sysid.fitted_eye import replayed, write_eye
 from orient_eye.sysid.physical import fit_physical, parameters
@@ -208,6 +214,21 @@ def test_the_command_writes_numbers_and_an_eye(tmp_path: Path, recorded: list[Pa
     assert all((tmp_path / "run" / name).stat().st_size > 10_000 for name in result["files"])
     assert result["held_out_rms_deg"] < 3 * NOISE_DEG
     assert make_plant("mujoco", eye=result["model"]).model.dof_damping[0] == result["fitted"]["friction"]["value"]
+
+
+@installed
+def test_the_fitted_eye_is_learned_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recordings = read_recordings(record(tmp_path, changed_eye(tmp_path / "true.xml"), [(0, 15, 0)]))
+    eye = str(tmp_path / "eye.xml")
+    write_eye(fit_physical(recordings), eye)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    short = functools.partial(find_optimum, random=np.random.default_rng(0), effort=0.1)
+    monkeypatch.setattr(evaluation, "searched_optimum", lambda *saccades, **_: short(*saccades))
+    options = {"eye": eye}
+    size = {"updates": 3, "saccades_per_update": 4, "warmup": 8, "batch_size": 8, "evaluation_pairs": 1}
+    train(TrainConfig("mujoco", options, **size), tmp_path / "run", quiet=True)
+    plant = make_plant("mujoco", **options).identity()
+    assert Policy.load(tmp_path / "run").task().plant.identity() == plant != make_plant("mujoco").identity()
 
 
 @installed

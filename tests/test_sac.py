@@ -31,7 +31,7 @@ def make_model(env: VecEnv, critics: int = 1, **settings: object) -> OneStepSAC:
         gradient_steps=1,
         seed=0,
         policy_kwargs={"net_arch": [16, 8], "features_extractor_class": GazeFeatures, "n_critics": critics},
-        **{"temperature": falling_temperature(), "device": "cpu", **settings},
+        **{"temperature": falling_temperature(1.0, 1e-3), "device": "cpu", **settings},
     )
     model.set_logger(Logger(folder=None, output_formats=[]))
     return model
@@ -253,7 +253,7 @@ class Learned(GazeFeatures):
 )
 def test_refuses_what_it_would_train_wrongly(env: SaccadeVecEnv, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        OneStepSAC("MlpPolicy", env, **{"temperature": falling_temperature(), **settings})
+        OneStepSAC("MlpPolicy", env, **{"temperature": falling_temperature(1.0, 1e-3), **settings})
 
 
 def test_the_example_with_a_stock_algorithm_learns(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,9 @@
 
 import csv
 import errno
+import hashlib
 import io
+import json
 import os
 import re
 import secrets
@@ -12,9 +14,12 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from orient_eye.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _MARK = ".tmp-orient-eye"
 _LEFTOVER = re.compile(rf"\..*-[0-9a-f]{{16}}{re.escape(_MARK)}(\.[^.]*)?")
@@ -164,3 +169,25 @@ def write_table(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     writer.writeheader()
     writer.writerows(rows)
     return write_text(path, text.getvalue())
+
+
+def read_arrays(path: Path) -> "tuple[dict[str, NDArray[Any]], dict[str, str]]":
+    """Arrays of a safetensors file by name, and its metadata.
+
+    Raises:
+        OSError: it cannot be read.
+        safetensors.SafetensorError: it is damaged, or none.
+    """
+    import safetensors  # and NumPy with it, which --help does not wait for
+
+    with safetensors.safe_open(path, "numpy") as opened:
+        return {name: opened.get_tensor(name) for name in opened.keys()}, opened.metadata() or {}  # noqa: SIM118  no iterator
+
+
+def digest(arrays: "Mapping[str, NDArray[Any]]", told: Mapping[str, Any]) -> str:
+    """SHA-256 of arrays and plain values: it shows damage, and proves nothing about who wrote them."""
+    found = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
+    for name in sorted(arrays):
+        found.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode())
+        found.update(arrays[name].tobytes())
+    return found.hexdigest()

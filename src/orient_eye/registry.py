@@ -63,7 +63,7 @@ class Registry(Mapping[str, T], Generic[T]):
             raise InputError(f"unknown {self.what} {name!r}; choose one of {', '.join(self)}")
         try:
             found = load(entry) if isinstance(entry, str) else entry
-        except Exception as error:
+        except Exception as error:  # importing it runs another package's code, which may raise anything
             raise InputError(f"{self.what} {name!r} of package {package} cannot be loaded: {error}") from error
         if self.kind is not None and not isinstance(found, self.kind):
             got, wanted = type(found).__name__, self.kind.__name__

@@ -27,8 +27,8 @@ class Evaluate:
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]
     """Run directory, policy folder, or name of a shipped policy."""
     pairs: Annotated[int | None, tyro.conf.arg(help_behavior_hint="(default: as many as its training)")] = None
-    """Number of random saccades, always the same ones, as in training runs; by default 300 in closed form and 60
-    simulated where something differs from its training."""
+    """Number of random saccades, always the same ones, as in training runs; by default 300 in closed form, 30 on
+    a rig and 60 simulated where something differs from its training."""
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: runs/evaluate-DATE-TIME)")] = None
     """Run directory, new or empty."""
     another_plant: AnotherPlant = field(default_factory=AnotherPlant)

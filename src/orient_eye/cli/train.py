@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from orient_eye.learning.config import TrainConfig
+from orient_eye.learning.config import PRESETS, TrainConfig
 
 if TYPE_CHECKING:
     from orient_eye.task.saccade import SaccadeTask
@@ -54,7 +54,7 @@ class Train:
                 result = resume(self.resume, quiet=self.quiet, checkpoint_s=self.checkpoint_every)
             else:
                 result = train(
-                    self.config, self.out, quiet=self.quiet, checkpoint_s=self.checkpoint_every, begun=_say_task
+                    self.config, self.out, quiet=self.quiet, checkpoint_s=self.checkpoint_every, begun=self._say
                 )
         except Interrupted as stopped:
             say(str(stopped))
@@ -65,6 +65,17 @@ class Train:
         say(f"in {result['out']}: policy.png, learning.png, recording.rrd")
         say(f"look at the saccades: orient-eye view {result['out']}/recording.rrd")
         return result
+
+    def _say(self, task: "SaccadeTask") -> None:
+        """What is trained, and whether a few updates more or less were quicker."""
+        from orient_eye.cli.tables import say
+
+        _say_task(task)
+        settings, usual = self.config.resolved(task), PRESETS[self.config.preset]["updates_per_rollout"]
+        if self.config.updates_per_rollout is None and settings.updates_per_rollout < usual:
+            few = settings.updates_per_rollout
+            made = "singly" if few == 1 else f"{few} at a time"
+            say(f"{settings.updates} updates are performed {made}; a multiple of {usual} is quicker")
 
 
 def _say_task(task: "SaccadeTask") -> None:

@@ -10,7 +10,6 @@ The networks are evaluated in NumPy: using a policy needs neither torch nor pick
 no code. The format of the file is in docs/policies.md.
 """
 
-import hashlib
 import json
 import math
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ import safetensors.numpy
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.files import write_atomically
+from orient_eye.files import digest, read_arrays, write_atomically
 from orient_eye.learning.features import GAZE_INPUTS, QUATERNION_INPUTS, gaze_features
 from orient_eye.plants import Plant
 from orient_eye.resources import data_folder
@@ -174,7 +173,7 @@ class Policy:
         arrays |= {f"bias{i}": b.astype(np.float32) for i, b in enumerate(self.biases)}
         arrays |= {"low": self.low, "high": self.high, "log": self.log}
         manifest = _finite(self.manifest)
-        head = {"format": _FORMAT, "sha256": _digest(arrays, manifest), **manifest}
+        head = {"format": _FORMAT, "sha256": digest(arrays, manifest), **manifest}
         metadata = {_METADATA: json.dumps(head, indent=1, allow_nan=False)}
         content = safetensors.numpy.save(arrays, metadata)
         return write_atomically(Path(folder) / NAME, lambda temporary: temporary.write_bytes(content))
@@ -267,28 +266,17 @@ def _read(file: Path) -> tuple[tuple[Array, ...], tuple[Array, ...], Array, Arra
     if file.stat().st_size > _LARGEST_BYTES:
         raise ValueError(f"{file.name} is larger than any policy")
     try:
-        with safetensors.safe_open(file, "numpy") as opened:
-            words = (opened.metadata() or {}).get(_METADATA)
-            arrays = {name: np.asarray(opened.get_tensor(name)) for name in opened.keys()}  # noqa: SIM118  no iterator
+        arrays, metadata = read_arrays(file)
     except safetensors.SafetensorError as error:
         raise ValueError(f"{file.name} is damaged, or no safetensors file ({error})") from error
-    manifest = json.loads(words or "{}")
+    manifest = json.loads(metadata.get(_METADATA) or "{}")
     if not isinstance(manifest, dict) or manifest.pop("format", None) != _FORMAT:
         raise ValueError(f"{file.name} is not of the format {_FORMAT!r}")
-    if manifest.pop("sha256") != _digest(arrays, manifest):
+    if manifest.pop("sha256") != digest(arrays, manifest):
         raise ValueError(f"{file.name} is damaged: its SHA-256 differs")
     layers = sum(name.startswith("weight") for name in arrays)
     weights, biases = (tuple(arrays[f"{kind}{i}"].astype(float) for i in range(layers)) for kind in ("weight", "bias"))
     return weights, biases, arrays["low"].astype(float), arrays["high"].astype(float), arrays["log"] != 0, manifest
-
-
-def _digest(arrays: dict[str, NDArray[Any]], manifest: dict[str, Any]) -> str:
-    """SHA-256 of everything in a policy file: it shows damage, and proves nothing about who wrote it."""
-    digest = hashlib.sha256(json.dumps(manifest, sort_keys=True).encode())
-    for name in sorted(arrays):
-        digest.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode())
-        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
-    return digest.hexdigest()
 
 
 def _finite(value: Any) -> Any:

@@ -36,7 +36,7 @@ class GazeFeatures(BaseFeaturesExtractor):
         return gaze_features(observations)
 
 
-def falling_temperature(first: float = 1.0, last: float = 1e-3, until: float = 0.8) -> Schedule:
+def falling_temperature(first: float, last: float, until: float = 0.8) -> Schedule:
     """Entropy temperature that falls geometrically from first to last over the first share of training.
 
     Returns:

@@ -19,7 +19,7 @@ from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND, HORIZON_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.movement import Movement
-from orient_eye.movement.measures import Measures, View, measure, measure_angle, merged
+from orient_eye.movement.measures import Measures, View, measure, measure_angle, merged, merged_rows
 from orient_eye.movement.trajectory import Trajectory, concatenate
 from orient_eye.plants import PulseRates
 from orient_eye.plants.limits import are_limited, limited_surrogate, travel_s
@@ -316,24 +316,19 @@ class MixedMovement:
     others: ClosedMovement
     command: PulseStep
 
-    def _merged(self, some: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-        values = np.empty((len(self.which), *some.shape[1:]), some.dtype)
-        values[self.which], values[~self.which] = some, others
-        return values
-
     @property
     def saturated(self) -> NDArray[np.bool_]:
         """See `orient_eye.movement.Movement`."""
-        return self._merged(self.some.saturated, self.others.saturated)
+        return merged_rows(self.which, self.some.saturated, self.others.saturated)
 
     @property
     def limited(self) -> NDArray[np.bool_]:
         """See `orient_eye.movement.Movement`."""
-        return self._merged(self.some.limited, self.others.limited)
+        return merged_rows(self.which, self.some.limited, self.others.limited)
 
     def energy(self) -> Array:
         """See `orient_eye.movement.Movement`."""
-        return self._merged(self.some.energy(), self.others.energy())
+        return merged_rows(self.which, self.some.energy(), self.others.energy())
 
     def measure(self, band: float = BAND, of: View = "orientation") -> Measures:
         """See `orient_eye.movement.Movement`."""

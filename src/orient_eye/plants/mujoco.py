@@ -12,8 +12,10 @@ forked child.
 
 import os
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -163,10 +165,22 @@ class MujocoPlant(ElasticPlant):
         return control
 
     def twin(self) -> TavaresPlant | None:
-        """The compiled reference with the same eye and limits; None for an eye that it does not compute."""
+        """The compiled reference with the same eye and limits.
+
+        None for an eye whose tendons it does not compute; and where there is no Numba to compile it, with a warning.
+        """
+        try:
+            import_module("numba")
+        except ImportError as error:
+            warnings.warn(
+                f"the best action is searched on MuJoCo itself, many times slower than on plant 'tavares', which Numba "
+                f"compiles: it cannot be imported ({error}); pip install numba",
+                stacklevel=2,
+            )
+            return None
         try:
             return TavaresPlant(**self.options, threads=self.threads)
-        except InputError:
+        except InputError:  # tendons on another kind of path: all else this plant has as well
             return None
 
     def torque(self, orientation: Array, motor: Array) -> Array:

@@ -6,11 +6,9 @@
 A safetensors file, as a policy's: arrays and a hash of them, nothing that could run.
 """
 
-import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import safetensors
@@ -18,7 +16,7 @@ import safetensors.numpy
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from orient_eye.files import write_atomically
+from orient_eye.files import digest, read_arrays, write_atomically
 from orient_eye.search.optimum import Optimum
 from orient_eye.state import State
 
@@ -78,7 +76,7 @@ def write_optimum(path: Path, found: Found) -> Path:
     }
     arrays = {name: np.ascontiguousarray(array, dtype=float) for name, array in arrays.items()}
     told = {"format": _FORMAT, "key": found.key, "evaluations": found.optimum.evaluations}
-    head = json.dumps({**told, "sha256": _digest(arrays, told)}, sort_keys=True)
+    head = json.dumps({**told, "sha256": digest(arrays, told)}, sort_keys=True)
     content = safetensors.numpy.save(arrays, {_METADATA: head})
     return write_atomically(path, lambda temporary: temporary.write_bytes(content))
 
@@ -88,10 +86,9 @@ def read_optimum(path: Path) -> Found | None:
     try:
         if path.stat().st_size > _LARGEST_BYTES:
             return None
-        with safetensors.safe_open(path, "numpy") as opened:
-            told = json.loads((opened.metadata() or {})[_METADATA])
-            arrays = {name: np.asarray(opened.get_tensor(name)) for name in opened.keys()}  # noqa: SIM118  no iterator
-        if told.pop("sha256") != _digest(arrays, told) or told["format"] != _FORMAT:
+        arrays, metadata = read_arrays(path)
+        told = json.loads(metadata[_METADATA])
+        if told.pop("sha256") != digest(arrays, told) or told["format"] != _FORMAT:
             return None
         if len({len(array) for array in arrays.values()}) != 1:
             return None
@@ -100,11 +97,3 @@ def read_optimum(path: Path) -> Found | None:
         return Found(str(told["key"]), start, arrays["target"], optimum)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, safetensors.SafetensorError):
         return None  # an InputError is a ValueError
-
-
-def _digest(arrays: dict[str, Array], told: dict[str, Any]) -> str:
-    digest = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
-    for name in sorted(arrays):
-        digest.update(f"{name} {arrays[name].dtype} {arrays[name].shape}".encode())
-        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
-    return digest.hexdigest()

@@ -249,7 +249,7 @@ def make_targets(name: str | None, plant: Plant, **options: Any) -> Targets:
     if name is not None:
         return TARGETS[name](plant, **options)
     for candidate in _NAMES.values():
-        with contextlib.suppress(InputError):
+        with contextlib.suppress(InputError):  # the plant does not turn the eye about this axis: the next one
             return TARGETS[candidate](plant, **options)
     return TARGETS["horizontal"](plant, **options)
 
