@@ -27,7 +27,6 @@ def _default(words: str) -> Any:
 
 PRESETS: dict[str, dict[str, Any]] = {
     "ours": {
-        "updates": 10_000,
         "saccades_per_update": 16,
         "updates_per_rollout": 8,
         "batch_size": 512,
@@ -97,7 +96,7 @@ class TrainConfig:
     """How long a simulated saccade lasts, in s."""
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
-    updates: Annotated[int | None, _default("10000; thesis 300000")] = None
+    updates: Annotated[int | None, _default("10000, 7000 on a simulated eye; thesis 300000")] = None
     """How many times the networks are updated; a multiple of 8 is quickest with ours."""
     saccades_per_update: Annotated[int | None, _default("16; thesis 1")] = None
     """Fresh saccades performed for each update."""
@@ -175,6 +174,7 @@ class TrainConfig:
         task = task or self.make_task()
         shared = {f.name for f in fields(TrainSettings)} & {f.name for f in fields(TrainConfig)}
         values: dict[str, Any] = {
+            "updates": task.plant.updates,
             "evaluation_pairs": task.plant.evaluation_pairs,
             **PRESETS[self.preset],
             **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},

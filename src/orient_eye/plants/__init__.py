@@ -51,7 +51,7 @@ class PulseRates:
         return cls((0.4 * slowest, 25 * fastest), (0.05 * slowest, 3 * fastest))
 
 
-EVALUATION_PAIRS = 60
+UPDATES, EVALUATION_PAIRS = 7000, 60
 """Of a simulated eye."""
 
 
@@ -64,6 +64,7 @@ class Plant(Protocol):
         motors: what moves the eye, (motors,).
         step_s: interval between the samples of its trajectories [s].
         horizon_s: how long a saccade has to last so that it can be measured; None where it needs no horizon.
+        updates: of the networks that learn on it, where nobody says how many.
         evaluation_pairs: how many random saccades are worth holding against the searched optimum.
         slow_pole: the pole [1/s] that k0 can cancel (thesis 4.2), on a plant that is linear and has one such; None
             where what k0 should be has to be found.
@@ -75,6 +76,7 @@ class Plant(Protocol):
     motors: tuple[Motor, ...]
     step_s: float
     horizon_s: float | None
+    updates: int
     evaluation_pairs: int
     slow_pole: float | None
     pulse_rates: PulseRates | None

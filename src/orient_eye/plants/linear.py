@@ -82,6 +82,7 @@ class LinearPlant(SimulatedPlant):
         limited = are_limited(self.motors)
         first_order = numbers.w0 is not None and not numbers.dead_time
         self.slow_pole = numbers.w0 if first_order and not limited else None
+        self.updates = 10_000
         self.evaluation_pairs = 30 if limited else 300
         self.horizon_s = self._horizon() if limited or numbers.range is not None else None
         as_thesis = first_order and not limited and numbers.eye is not None

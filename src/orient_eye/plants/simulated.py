@@ -14,7 +14,7 @@ from orient_eye.errors import InputError
 from orient_eye.motor import Motor, names, ranges
 from orient_eye.movement import Movement, SampledMovement, energy_of
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.plants import EVALUATION_PAIRS, Plant, PulseRates
+from orient_eye.plants import EVALUATION_PAIRS, UPDATES, Plant, PulseRates
 from orient_eye.plants.limited_motor import follow
 from orient_eye.rotations import FORWARD
 from orient_eye.state import State
@@ -131,6 +131,7 @@ class SimulatedPlant(ABC):
     motors: tuple[Motor, ...]
     step_s: float = STEP_S
     horizon_s: float | None = HORIZON_S
+    updates: int = UPDATES
     evaluation_pairs: int = EVALUATION_PAIRS
     slow_pole: float | None = None
     pulse_rates: PulseRates | None = None
