@@ -149,7 +149,10 @@ def main(arguments: list[str] | None = None) -> Streamed:
     parser.add_argument("command", help="CSV file written by orient-eye predict --rig")
     parser.add_argument("--rig", required=True, help="the rig's TOML file, or a shipped one")
     given = parser.parse_args(arguments)
-    done = stream(read_rows(given.command, Rig.load(given.rig)), FakeDriver(loud=True))
+    try:
+        done = stream(read_rows(given.command, Rig.load(given.rig)), FakeDriver(loud=True))
+    except InputError as error:
+        parser.error(str(error))
     print(f"{done.rows} rows sent" + (", then stopped: the motors hold the last one" if done.interrupted else ""))
     for row, behind in done.late.items():
         print(f"row {row} was {1e3 * behind:.1f} ms late")

@@ -102,6 +102,7 @@ class Check:
 
     def _model(self) -> "tuple[Plant, Surrogate | None, Rig | None, float]":
         """The plant that predicts, its surrogate where it is one, the rig, and the settling band."""
+        from orient_eye.cli.tables import say
         from orient_eye.learning.policy import NAME, Policy, shipped_policies
         from orient_eye.plants import make_plant, restore_plant
         from orient_eye.rig import Rig
@@ -112,9 +113,13 @@ class Check:
         place = Path(self.model)
         policy = self.model in shipped_policies() or place.name == NAME or (place / NAME).is_file()
         if policy:
-            task = Policy.load(self.model).manifest["task"]
+            learned = Policy.load(self.model)
+            task = learned.manifest["task"]
             identity, band = task["plant"], float(task["band"])
             plant = restore_plant(identity) if rig is None else restore_plant(identity, rig=rig)
+            others = learned.require(learned.task(plant), force=True)
+            if others:
+                say(f"note: this is another rig than the policy's, which was trained for {'; '.join(others)}", "red")
             surrogate: Surrogate | None = getattr(plant, "surrogate", None)
         else:
             band = BAND
@@ -206,11 +211,15 @@ def _say_rest(held: "Held", band: float) -> None:
     say(f"duration: until the eye stays within {held.band_deg:.3g} deg of its end, {share}")
     told = [
         f"residual rms {held.residual_rms_deg:.3f} deg (sensor's noise {held.noise_deg:.3f})",
-        f"eye {1e3 * held.shift_s:+.1f} ms later than predicted",
+        f"eye {_when(held.shift_s)} than predicted",
     ]
     if held.motor_shift_s is not None:
-        told.append(f"motor {1e3 * held.motor_shift_s:+.1f} ms later than told")
+        told.append(f"motor {_when(held.motor_shift_s)} than told")
     told.append(f"at that shift {held.gain:.3f} times the movement, rms {held.left_rms_deg:.3f} deg left")
     if held.model_rms_deg is not None:
         told.append(f"model driven by the measured motor: rms {held.model_rms_deg:.3f} deg")
     say("; ".join(told))
+
+
+def _when(shift_s: float) -> str:
+    return f"{1e3 * abs(shift_s):.1f} ms {'earlier' if shift_s < 0 else 'later'}"

@@ -163,7 +163,7 @@ class Policy:
         if words and not force:
             raise InputError(
                 f"this policy was trained for {'; '.join(words)}. Train one for this task, or force it "
-                "(force=True) to use it all the same"
+                "(--force; in Python force=True) to use it all the same"
             )
         return words
 

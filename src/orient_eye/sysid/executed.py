@@ -257,7 +257,9 @@ def _advice(
         motor_late = held.motor_shift_s is not None and abs(held.motor_shift_s) > 0.5 * abs(held.shift_s)
         way = "later" if held.shift_s > 0 else "earlier"
         what = (
-            "the motor as much: the driver delays the command, or the clocks of command and recording differ"
+            "see whether the recording begins when the command was sent (--sent-at), and the limits of the rig"
+            if held.shift_s < 0
+            else "the motor as much: the driver delays the command, or the clocks of command and recording differ"
             if motor_late
             else "identify the dead time again, or see whether the clocks of command and recording differ"
         )
