@@ -120,9 +120,9 @@ class _Output:
         axes.set(ylabel=f"|{number.label}| [{number.unit}]" if number and number.from_start else key[1])
         if number is None and values.min() > 0 and values.max() > _WIDE * values.min():
             axes.set_yscale("log")
-        if number is not None and not number.from_start:  # no drama in the second decimal
+        bounds = None if number is None or number.from_start else task.actions.numbers[number.index]
+        if bounds is not None and not bounds.log:  # no drama in the second decimal
             low, high = axes.get_ylim()
-            bounds = task.actions.numbers[number.index]
             more = max(_LEAST_SHARE * (bounds.high - bounds.low) - (high - low), 0) / 2
             axes.set_ylim(low - more, high + more)
         tidy(axes)
