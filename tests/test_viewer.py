@@ -75,7 +75,7 @@ def test_the_server_ends_with_its_parent_and_leaves_nothing_at_home(recorded: Pa
         env=at_home(tmp_path, FORCE_RERUN_ANALYTICS="1"),
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # also where nohup started the tests
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # noqa: PLW1509 - nohup ignores it; one thread here
     )
     with process:
         assert process.stderr is not None
