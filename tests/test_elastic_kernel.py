@@ -107,7 +107,7 @@ def test_torque_is_the_witness(options: dict[str, Any]) -> None:
     for found, expected in zip(plant.elastic_torque(turn, motor), reference.elastic_torque(turn, motor), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
     one, many = plant.elastic_torque(turn[:1], motor), plant.elastic_torque(np.repeat(turn[:1], 40, axis=0), motor)
-    identical((*one, None, None), (*many, None, None))  # type: ignore[arg-type]
+    identical((*one, None, None), (*many, None, None))  # type: ignore[arg-type]  # a run's first two
 
 
 @pytest.mark.parametrize("options", [{}, {"gravity": True}, {"eye": "eve_v3"}], ids=str)
@@ -310,7 +310,7 @@ def spied(plant: TavaresPlant) -> set[int]:
         workers.add(threading.get_ident())
         kernel.run(*arguments)
 
-    plant._kernel = SimpleNamespace(run=run, still=kernel.still)  # type: ignore[assignment]
+    plant._kernel = SimpleNamespace(run=run, still=kernel.still)  # type: ignore[assignment]  # a module's stand-in
     return workers
 
 

@@ -8,7 +8,6 @@ What play leaves open widens the error that is granted, and by half of it to eit
 import csv
 import json
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +27,7 @@ SIZES_DEG = (5.0, 10.0, 20.0, 30.0, 40.0)
 QUICK = () if RIGS > 1 else ("--updates", "1500", "--evaluation-pairs", "6")
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("private_cache")
 
 
 def ends(limit: float) -> tuple[np.ndarray, np.ndarray]:

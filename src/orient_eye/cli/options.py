@@ -52,7 +52,7 @@ def offered(command: type[T], taken: frozenset[str] = frozenset()) -> type[T]:
         taken: names of options around it, which no plant's option may have.
     """
     own: list[tuple[str, Any, Any]] = []
-    taken |= {each.name for each in fields(command)}  # type: ignore[arg-type]
+    taken |= {each.name for each in fields(command)}  # type: ignore[arg-type]  # a dataclass by contract
     for each, hint in _hints(command):
         if each.name == "plant_options":
             inner, name = _plant_options(taken), "plant"

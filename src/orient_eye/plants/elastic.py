@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orient_eye.constants import HORIZON_S
+from orient_eye.errors import InputError
 from orient_eye.eyes import model as eyes
 from orient_eye.motor import check_driven, ranges
 from orient_eye.plants import PulseRates, equilibrium
@@ -29,11 +30,12 @@ class ElasticPlant(SimulatedPlant):
     Args:
         options: keywords of the plant, which its identity shows: `eye` among them.
         step_s: of the integration.
+        threads: that share a batch; 0 for one a core.
         gravity: with the gravity torque as an actuator of the model.
         rig: whose motors limit those of the same names, or its limits in plain values; the identity then shows them.
 
     Raises:
-        InputError: an eye or a rig that is none, or a rig's motor that the eye has not.
+        InputError: an eye, a rig or a number of threads that is none, or a rig's motor that the eye has not.
     """
 
     resumes = True
@@ -43,15 +45,25 @@ class ElasticPlant(SimulatedPlant):
         options: dict[str, Any],
         *,
         step_s: float,
+        threads: int = 0,
         gravity: bool = False,
         rig: Rig | Limits | str | Path | None = None,
     ) -> None:
+        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 0:
+            raise InputError(f"threads are a whole number, 0 for one a core, got {threads!r}")
+        self.threads = int(threads)
         self.model = eyes.build_model(options["eye"], step_s=step_s, gravity=gravity, visual=False)
         own = eyes.motors(self.model)
         limits = {} if rig is None else limits_of(rig, own, self.name)
         self.motors = limited(own, limits)
         self.options = {**options, "rig": limits} if limits else options
         self.tendons = tuple(self.model.tendon(i).name for i in range(self.model.ntendon))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.options, "threads": self.threads}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state)  # type: ignore[misc]  # models and compiled code are made again in the process
 
     def _fit_to_limits(self) -> None:
         """Horizon and bounds of pulses that suit limited motors; at the end of a constructor, as it asks torques."""

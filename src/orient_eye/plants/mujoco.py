@@ -65,12 +65,9 @@ class MujocoPlant(ElasticPlant):
         rig: Rig | Limits | str | Path | None = None,
         threads: int = 0,
     ) -> None:
-        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 0:
-            raise InputError(f"threads are a whole number, 0 for one a core, got {threads!r}")
-        self.threads = threads
         self.substeps = _ACCURATE_SUBSTEPS if accurate else 1
         options = {"eye": eye, "accurate": accurate, "gravity": gravity}
-        super().__init__(options, step_s=self.step_s / self.substeps, gravity=gravity, rig=rig)
+        super().__init__(options, step_s=self.step_s / self.substeps, threads=threads, gravity=gravity, rig=rig)
         if accurate:
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         eye_joint = self.model.joint("eye")
@@ -85,14 +82,8 @@ class MujocoPlant(ElasticPlant):
         self._sensed_velocity = self._sensed("angular_velocity")
         lengths = [self._sensed(f"length_{name}") for name in self.tendons]
         self._sensed_length = np.array([place.start for place in lengths])
-        self._pool = _Pool(self.model, threads)
+        self._pool = _Pool(self.model, self.threads)
         self._fit_to_limits()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.options, "threads": self.threads}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(**state)  # type: ignore[misc]  # models and batches are rebuilt in the process
 
     def _sensed(self, name: str) -> slice:
         """Where a sensor's numbers are in sensordata."""

@@ -53,7 +53,7 @@ class Given:
     def __getitem__(self, which: NDArray[Any]) -> "Given":
         """Some of the saccades; the command must know how to give some of itself."""
         parts = (self.told, self.motor, self.start, self.saturated, self.limited, self.failed)
-        return Given(self.command[which], *(part[which] for part in parts))  # type: ignore[index, arg-type]
+        return Given(self.command[which], *(part[which] for part in parts))  # type: ignore[index, arg-type]  # as the docstring asks
 
 
 @dataclass(frozen=True)

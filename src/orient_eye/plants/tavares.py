@@ -70,16 +70,13 @@ class TavaresPlant(ElasticPlant):
         rig: Rig | Limits | str | Path | None = None,
         threads: int = 0,
     ) -> None:
-        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 0:
-            raise InputError(f"threads are a whole number, 0 for one a core, got {threads!r}")
         if accurate and as_published:
             raise InputError("as_published is the author's own integrator, which accurate replaces: choose one of them")
         self._kernel = _compiled()
-        self.threads = int(threads)
         options = {"eye": eye, "gravity": gravity, "as_published": as_published}
         if accurate:  # told only then: what was kept of the thesis' integrator still has this identity
             options["accurate"] = True
-        super().__init__(options, step_s=self.step_s, rig=rig)
+        super().__init__(options, step_s=self.step_s, threads=threads, rig=rig)
         self.elastics = Elastics.from_model(self.model)
         decay = self.step_s * self.elastics.friction / np.linalg.eigvalsh(self.elastics.inertia)[0]
         self.substeps = max(1, int(np.ceil(decay / _DECAY))) if accurate else 0
@@ -90,12 +87,6 @@ class TavaresPlant(ElasticPlant):
         weight = [self.elastics.centre_of_mass, [0, 0, -self.elastics.mass * STANDARD_GRAVITY if gravity else 0]]
         self._weighed = self._weightless._replace(weight=np.array(weight))
         self._fit_to_limits()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.options, "threads": self.threads}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(**state)  # type: ignore[misc]  # compiled code stays in its process
 
     def _eye(self, slides: NDArray[np.bool_]) -> Any:
         """The kernel's, without weight; its lines are the elastics here."""
