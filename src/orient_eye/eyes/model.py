@@ -151,6 +151,19 @@ def tendon_tension(model: mujoco.MjModel, length: Array) -> Array:
     return model.tendon_stiffness * np.maximum(length - model.tendon_lengthspring[:, 1], 0)
 
 
+def pairs(model: mujoco.MjModel) -> NDArray[np.intp] | None:
+    """The two elastics that each motor pulls against one another, (motors, 2); None where they are not pairs."""
+    arms = [int(model.jnt_bodyid[model.actuator(motor.name).trnid[0]]) for motor in motors(model)]
+    pulled: list[list[int]] = [[] for _ in arms]
+    for tendon in range(model.ntendon):
+        start = model.tendon_adr[tendon]
+        path = slice(start, start + model.tendon_num[tendon])
+        sites = model.wrap_objid[path][model.wrap_type[path] == mujoco.mjtWrap.mjWRAP_SITE]
+        for body in {int(model.site_bodyid[site]) for site in sites} & set(arms):
+            pulled[arms.index(body)].append(tendon)
+    return np.array(pulled) if all(len(each) == 2 for each in pulled) else None
+
+
 _PHYSICS = (
     "body_parentid", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia",
     "jnt_type", "jnt_bodyid", "jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness", "dof_damping", "dof_armature",

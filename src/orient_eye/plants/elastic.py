@@ -15,10 +15,11 @@ from orient_eye.errors import InputError
 from orient_eye.eyes import model as eyes
 from orient_eye.motor import check_driven, ranges
 from orient_eye.plants import PulseRates, equilibrium
+from orient_eye.plants.fixation import Fixations
 from orient_eye.plants.limits import Limits, are_limited, limited, limits_of, travel_s
 from orient_eye.plants.simulated import SimulatedPlant
 from orient_eye.rig import Rig
-from orient_eye.rotations import rotation
+from orient_eye.rotations import gaze, rotation
 
 Array = NDArray[np.float64]
 _TURN = 1e-4  # rad, of the difference quotients of the torque
@@ -75,12 +76,59 @@ class ElasticPlant(SimulatedPlant):
     def torque(self, orientation: Array, motor: Array) -> Array:
         """All torques but friction [N m] (n, 3), head frame, on an eye at rest in orientations (n, 4)."""
 
+    @abstractmethod
+    def tension(self, orientation: Array, motor: Array) -> Array:
+        """Tension of the tendons [N] (n, tendons) in orientations (n, 4) with the motors at (n, motors)."""
+
+    def force(self, orientation: Array, motor: Array) -> Array | None:
+        """See `orient_eye.plants.Plant`."""
+        if self._pairs is None:
+            return None
+        tension = self.tension(orientation, motor)
+        return np.asarray(((tension[:, self._pairs[:, 0]] - tension[:, self._pairs[:, 1]]) ** 2).sum(axis=1))
+
+    def excess_force(self, orientation: Array, motor: Array) -> Array | None:
+        """See `orient_eye.movement.Movement`; NaN where an orientation is none."""
+        known = np.isfinite(orientation).all(axis=1) & np.isfinite(motor).all(axis=1)
+        found = self.force(orientation[known], motor[known])
+        if found is None:
+            return None
+        excess = np.full(len(motor), np.nan)
+        excess[known] = found - self._fixations.force(gaze(orientation[known]))
+        return excess
+
+    @cached_property
+    def _fixations(self) -> Fixations:
+        return Fixations.of(self)
+
+    @cached_property
+    def _pairs(self) -> NDArray[np.intp] | None:
+        return eyes.pairs(self.model)
+
     def identity(self) -> dict[str, Any]:
         """Name, options and hash of the compiled model."""
         return {"plant": self.name, **self.options, "model": self._model_hash}
 
     def rates(self) -> list[float]:
         """Sizes of the poles [1/s] of the eye linearised at rest; of a mode that does not swing the slower one."""
+        poles, _ = self._modes
+        swings = np.abs(poles.imag) > 1e-6 * np.abs(poles)
+        slow = np.sort(np.abs(poles[~swings]))
+        sizes = [*slow[: (len(slow) + 1) // 2], *np.abs(poles[swings & (poles.imag > 0)])]
+        return sorted(float(f"{size:.4g}") for size in sizes)  # the same bounds of actions on any machine
+
+    def motor_rates(self) -> Array:
+        """See `orient_eye.plants.Plant`."""
+        poles, ways = self._modes
+        moved = self.rest(np.concatenate([np.zeros((1, len(self.motors))), np.eye(len(self.motors))]))
+        turned = (rotation(moved[1:]) * rotation(moved[0]).inv()).as_rotvec().T
+        parts = np.linalg.solve(ways, np.concatenate([turned, np.zeros_like(turned)]))
+        shares = np.linalg.norm(ways[:3], axis=0)[:, None] * np.abs(parts)
+        return np.array([float(f"{rate:.4g}") for rate in np.abs(poles)[shares.argmax(axis=0)]])
+
+    @cached_property
+    def _modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Poles [1/s] (6,) of the eye linearised at rest and its modes, turn and speed [rad, rad/s] (6, poles)."""
         at = np.zeros((1, len(self.motors)))
         rest = self.rest(at)
         turns = np.concatenate([np.eye(3), -np.eye(3)]) * _TURN
@@ -90,11 +138,8 @@ class ElasticPlant(SimulatedPlant):
         inertia, friction = self._inertia_and_friction(rest[0])
         still, unit = np.zeros((3, 3)), np.eye(3)
         motion = np.block([[still, unit], [-np.linalg.solve(inertia, stiffness), -np.linalg.solve(inertia, friction)]])
-        poles = np.linalg.eigvals(motion)
-        swings = np.abs(poles.imag) > 1e-6 * np.abs(poles)
-        slow = np.sort(np.abs(poles[~swings]))
-        sizes = [*slow[: (len(slow) + 1) // 2], *np.abs(poles[swings & (poles.imag > 0)])]
-        return sorted(float(f"{size:.4g}") for size in sizes)  # the same bounds of actions on any machine
+        poles, ways = np.linalg.eig(motion)
+        return poles.astype(complex), ways.astype(complex)
 
     def _inertia_and_friction(self, orientation: Array) -> tuple[Array, Array]:
         """Of the eye, head frame, (3, 3) each."""
@@ -118,6 +163,13 @@ class ElasticPlant(SimulatedPlant):
     def rest(self, motor: Array) -> Array:
         """See `orient_eye.plants.Plant`."""
         return equilibrium.rest_orientation(self.torque, motor)
+
+    def held(self, orientation: Array, driven: tuple[str, ...]) -> Array:
+        """See `orient_eye.plants.Plant`."""
+        index = check_driven(self.motors, driven, self.name)
+        working = np.array([motor.working for motor in self.motors])
+        motor, held = equilibrium.held_motor(self.torque, orientation, len(self.motors), index, working)
+        return np.where(held[:, None], motor, np.nan)
 
     def hold(self, orientation: Array, driven: tuple[str, ...]) -> Array:
         """See `orient_eye.plants.Plant`."""

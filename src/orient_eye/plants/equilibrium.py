@@ -71,6 +71,24 @@ def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int
     Raises:
         InputError: an orientation that these motors cannot hold.
     """
+    motor, held = held_motor(torque, orientation, motors, driven, limit)
+    if not held.all():
+        worst = int(held.argmin())
+        raise InputError(
+            f"orientation {np.round(orientation[worst], 4).tolist()} (w, x, y, z) is no equilibrium of motors "
+            f"{[i + 1 for i in driven]} within their range: choose one they can hold"
+        )
+    return motor
+
+
+def held_motor(
+    torque: Torque, orientation: Array, motors: int, driven: list[int], limit: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """As `rest_motor`, and which of the orientations are held, (n,).
+
+    Raises:
+        InputError: numbers that are not finite.
+    """
     orientation = np.asarray(orientation, dtype=float)
     if not np.isfinite(orientation).all():
         raise InputError("an orientation to hold holds numbers that are not finite")
@@ -99,10 +117,4 @@ def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int
     far = np.flatnonzero(~bad & (angle_between(orientation, FORWARD) > _FAR_DEG))
     if far.size:
         bad[far] = angle_between(rest_orientation(torque, motor[far]), orientation[far]) > 1e-4
-    if bad.any():
-        worst = int(bad.argmax())
-        raise InputError(
-            f"orientation {np.round(orientation[worst], 4).tolist()} (w, x, y, z) is no equilibrium of motors "
-            f"{[i + 1 for i in driven]} within their range: choose one they can hold"
-        )
-    return motor
+    return motor, ~bad

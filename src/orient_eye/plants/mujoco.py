@@ -82,7 +82,7 @@ class MujocoPlant(ElasticPlant):
         self._sensed_velocity = self._sensed("angular_velocity")
         lengths = [self._sensed(f"length_{name}") for name in self.tendons]
         self._sensed_length = np.array([place.start for place in lengths])
-        self._pool = _Pool(self.model, self.threads)
+        self._pool, self._empty = _Pool(self.model, self.threads), mujoco.MjData(self.model)
         self._fit_to_limits()
 
     def _sensed(self, name: str) -> slice:
@@ -176,15 +176,24 @@ class MujocoPlant(ElasticPlant):
 
     def torque(self, orientation: Array, motor: Array) -> Array:
         """See `orient_eye.plants.elastic.ElasticPlant`."""
+        passive, actuated = self._still(orientation, motor, "qfrc_passive", "qfrc_actuator")
+        return rotation(orientation).apply((passive + actuated)[:, self._eye_qvel])
+
+    def tension(self, orientation: Array, motor: Array) -> Array:
+        """See `orient_eye.plants.elastic.ElasticPlant`."""
+        (sensed,) = self._still(orientation, motor, "sensordata")
+        return self._tension(sensed[:, self._sensed_length])
+
+    def _still(self, orientation: Array, motor: Array, *fields: str) -> list[Array]:
+        """Fields (n, size) of MuJoCo's data with the eye and its motors at rest."""
         if not len(orientation):
-            return np.zeros((0, 3))
-        with self._pool.batch("torque", len(orientation)) as batch:  # nothing but qpos ever changes in these
+            return [np.zeros((0, getattr(self._empty, field).size)) for field in fields]
+        with self._pool.batch("still", len(orientation)) as batch:  # nothing but qpos ever changes in these
             batch.qpos[:, self._eye_qpos] = orientation
             batch.qpos[:, self._motor_qpos] = motor * self._per_control
-            passive, actuated = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
+            bound = [batch.bind(field) for field in fields]
             batch.forward()
-            in_eye_frame = (passive + actuated)[:, self._eye_qvel]
-        return rotation(orientation).apply(in_eye_frame)
+            return [np.array(each) for each in bound]
 
 
 class _Pool:
