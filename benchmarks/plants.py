@@ -2,11 +2,12 @@
 
     python benchmarks/plants.py
 
-Plant `mujoco` against bare mujoco.rollout, and the compiled plant `tavares` against plant `mujoco`: same eye, same
-commands, same threads, tensions recorded, in turn; the median of the ratios counts. `run` steps the batch and records
-it; `move` also looks at the command before and makes a trajectory after. Then how long making plant `tavares` takes in
-a fresh process, with what was compiled before and without. The author's own Python program made 944 steps/s (spec of
-the project, measured on a machine of the same class).
+Plant `mujoco` against bare mujoco.rollout, the compiled plant `tavares` against plant `mujoco`, and the surrogate
+`viscous` against `tavares`: same eye, same commands, same threads, tensions recorded (`viscous` has none), in turn; the
+median of the ratios counts. `run` steps the batch and records it; `move` also looks at the command before and makes a
+trajectory after. Then how long making plant `tavares` takes in a fresh process, with what was compiled before and
+without. The author's own Python program made 944 steps/s (spec of the project, measured on a machine of the same
+class).
 """
 
 import argparse
@@ -25,6 +26,7 @@ import numpy as np
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.tavares import TavaresPlant
+from orient_eye.plants.viscous import ViscousPlant
 from orient_eye.rotations import FORWARD, angle_between
 from orient_eye.state import State
 
@@ -55,6 +57,7 @@ def main() -> None:
     command = np.clip(pulse.sample(0.001, steps + 1), -80, 80)
     start = State(np.tile(FORWARD, (n, 1)), command[:, 0])
     batch, kernel = MujocoPlant(threads=threads), TavaresPlant(threads=threads)
+    viscous = ViscousPlant(threads=threads)
     accurate = MujocoPlant(threads=threads, accurate=True), TavaresPlant(threads=threads, accurate=True)
 
     model = batch.model
@@ -73,6 +76,7 @@ def main() -> None:
         "tavares: run": lambda: kernel.run(command, start),
         "mujoco, accurate: run": lambda: accurate[0].run(command, start),
         "tavares, accurate: run": lambda: accurate[1].run(command, start),
+        "viscous: run": lambda: viscous.run(command, start),
     }
     seconds: dict[str, list[float]] = {name: [] for name in work}
     made = {}
@@ -89,6 +93,7 @@ def main() -> None:
         ("tavares: run", "mujoco: run"),
         ("tavares: move", "mujoco: move"),
         ("tavares, accurate: run", "mujoco, accurate: run"),
+        ("viscous: run", "tavares: run"),
     ):
         ratio = np.array(seconds[slow]) / np.array(seconds[fast])
         print(f"{fast} over {slow}: median {np.median(ratio):.2f}, {ratio.min():.2f} to {ratio.max():.2f}")

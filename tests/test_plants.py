@@ -42,6 +42,7 @@ OURS: list[tuple[str, dict[str, Any]]] = [
     ("mujoco", {"gravity": True}),
     ("tavares", {"accurate": True}),
     ("tavares", {"as_published": True}),
+    ("viscous", {}),
 ]
 ALL = [*OURS, *((name, {}) for name in PLANTS if (name, {}) not in OURS)]
 

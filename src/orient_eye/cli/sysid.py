@@ -34,11 +34,14 @@ class Sysid:
     as their driver tells them (docs/rigs.md). First and second order, without and with dead time, are fitted and
     compared. The run directory holds surrogate.json (for `orient-eye train --surrogate FILE`), every fit as a table,
     pictures, a recording, and for recordings rig.toml: the rig, or a first description of it to fill in.
-    With --plan: what to record, as commands inside the rig's limits.
+    With --plan: what to record, as commands inside the rig's limits. With --all-motors: a surrogate of the plant that
+    all its motors turn (surrogate_3d.json, for `orient-eye train --plant modal --surrogate FILE`).
 
     $ orient-eye sysid
 
     $ orient-eye sysid --plant lpf --amplitudes 2 5 10 20
+
+    $ orient-eye sysid --all-motors --plant tavares
 
     $ orient-eye sysid --recording step1.csv step2.csv
 
@@ -84,6 +87,10 @@ class Sysid:
     """Time of a prototype log, which has none: one interval from its motors, each row by itself, or 10 ms."""
     until: Annotated[float | None, _default("the whole recording")] = None
     """Leave out of recordings what comes after this time, s: a sensor that creeps long after the step."""
+    all_motors: bool = False
+    """Identify a plant with all its motors: three linear modes, about roll, pitch and yaw."""
+    seed: Annotated[int | None, _default("0")] = None
+    """Of the movements that --all-motors draws."""
     physical: bool = False
     """Fit the MJCF of --eye to the recordings instead (docs/sysid.md, Physical parameters), and write it."""
     frozen: Annotated[tuple[str, ...] | None, _default("stiffness_horizontal and the rest lengths", "NAME ...")] = None
@@ -96,6 +103,12 @@ class Sysid:
         from orient_eye.run_directory import RunDirectory
         from orient_eye.sysid.report import write_report
 
+        if self.all_motors:
+            from orient_eye.cli.sysid_modes import modes_of
+
+            return modes_of(self)
+        if self.seed is not None:
+            raise InputError("--seed is for --all-motors; leave it out, or say --all-motors")
         if self.plan:
             return self._plan()
         if self.physical:

@@ -70,6 +70,8 @@ class Plant(Protocol):
             where what k0 should be has to be found.
         pulse_rates: bounds of B and of k0 [1/s] that hold the best pulse-steps, where the thesis' (18 to 80, 5 to 40)
             do not; None where they do.
+        doubt: share of the amplitude by which a measure may be wrong because a simulated saccade was not stepped on; a
+            copy of the plant may take it more lightly, to learn on (`orient_eye.learning.training`).
     """
 
     name: str
@@ -80,6 +82,7 @@ class Plant(Protocol):
     evaluation_pairs: int
     slow_pole: float | None
     pulse_rates: PulseRates | None
+    doubt: float
 
     def move(
         self,
@@ -118,6 +121,25 @@ class Plant(Protocol):
         Raises:
             InputError: an orientation that the driven motors cannot hold.
         """
+        ...
+
+    def held(self, orientation: Array, driven: tuple[str, ...]) -> Array:
+        """As `hold`, inside the motors' working range; NaN where that is out of reach."""
+        ...
+
+    def force(self, orientation: Array, motor: Array) -> Array | None:
+        """Of fixations: the sum over pairs of elastics of the squared difference of their tensions [N^2], (saccades,).
+
+        None for a plant whose elastics are not known.
+
+        Args:
+            orientation: of eyes at rest, (saccades, 4).
+            motor: that hold them, (saccades, motors).
+        """
+        ...
+
+    def motor_rates(self) -> Array:
+        """Size of the pole [1/s] by which the eye follows each motor above all, at rest, (motors,); NaN if unknown."""
         ...
 
     def identity(self) -> dict[str, Any]:
@@ -203,6 +225,17 @@ PLANTS: Registry[PlantKind] = Registry(
                 Option("as_published", bool, False, "The author's program to the letter."),
                 _RIG,
             ),
+        ),
+        "viscous": PlantKind(
+            "the eye without its inertia, compiled: a non-linear surrogate",
+            "orient_eye.plants.viscous:ViscousPlant",
+            (_EYE, _GRAVITY, _RIG),
+        ),
+        "modal": PlantKind(
+            "three low-pass surrogates in parallel, for all motors",
+            "orient_eye.plants.modal:ModalPlant",
+            (Option("surrogate", str, "thesis-3d", "A surrogate_3d.json of sysid --all-motors, or a shipped one."),),
+            restore="orient_eye.plants.modal:restore",
         ),
     },
     PlantKind,

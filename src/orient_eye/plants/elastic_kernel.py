@@ -9,6 +9,7 @@ children too; a saccade's numbers do not depend on its slice.
 import math
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -229,6 +230,36 @@ def _between(row: Array, following: Array, share: float, motor: Array) -> None:
         motor[m] = (1 - share) * row[m] + share * following[m]
 
 
+@_inlined
+def _mean(rows: Array, motor: Array) -> None:
+    """Of straight lines between rows (two or more, motors), over time, into motor (motors,)."""
+    last = len(rows) - 1
+    for m in range(len(motor)):
+        whole = 0.5 * (rows[0, m] + rows[last, m])
+        for j in range(1, last):
+            whole += rows[j, m]
+        motor[m] = whole / last
+
+
+@_inlined
+def _spin(q: Quaternion, rate: Quaternion, s: float) -> Vector:
+    """Angular velocity, head frame [rad/s], of a quaternion that changes at a rate; s is 2 / |q|^2."""
+    turn = _cross((rate[1], rate[2], rate[3]), (q[1], q[2], q[3]))
+    return (
+        s * (q[0] * rate[1] - rate[0] * q[1] - turn[0]),
+        s * (q[0] * rate[2] - rate[0] * q[2] - turn[1]),
+        s * (q[0] * rate[3] - rate[0] * q[3] - turn[2]),
+    )
+
+
+@_inlined
+def _creeping(eye: Eye, q: Quaternion, motor: Array, at: Array, end: Array, behind: Array, tension: Array) -> Vector:
+    """Angular velocity of an eye without inertia, head frame [rad/s]."""
+    _stand(eye, motor, at, end, behind)
+    torque = _pull(eye, _turn(q, 2.0), end, behind, tension)
+    return torque[0] / eye.friction, torque[1] / eye.friction, torque[2] / eye.friction
+
+
 def _run(
     eye: Eye,
     motor: Array,
@@ -298,6 +329,67 @@ def _run(
                 omega = _on(omega, _acceleration(eye, turn, omega, torque), step_s)
                 half = 0.5 * step_s
                 q = _turned(q, (half * omega[0], half * omega[1], half * omega[2]))
+
+
+def _creep(
+    eye: Eye,
+    motor: Array,
+    orientation: Array,
+    velocity: Array,
+    diverged: NDArray[np.bool_],
+    step_s: float,
+    stride: int,
+) -> None:
+    """Move eyes without inertia, friction * omega = torque, by the midpoint method; see `_run`.
+
+    Args:
+        eye: that moves.
+        motor: positions of the joints [rad or m], (saccades, time, motors); in the middle of a step their mean over it.
+        orientation: of the eyes (saccades, time, 4): the first sample is the start, the others are written.
+        velocity: written, [rad/s], head frame, (saccades, time, 3).
+        diverged: written, (saccades,): faster than 1e4 rad/s, or no number; NaN from there on.
+        step_s: between samples [s].
+        stride: samples a step; those inside it lie on the cubic through its ends and their velocities.
+    """
+    samples, motors, tendons = motor.shape[1], motor.shape[2], len(eye.pulled)
+    at, end, behind = np.empty(motors), np.empty((tendons, 3)), np.empty(tendons)
+    scratch, middle = np.empty(tendons), np.empty(motors)
+    for s in range(len(motor)):
+        at[:] = np.nan
+        q = orientation[s, 0, 0], orientation[s, 0, 1], orientation[s, 0, 2], orientation[s, 0, 3]
+        q = _scaled(q, 1 / math.sqrt(_square(q)))
+        omega = _creeping(eye, q, motor[s, 0], at, end, behind, scratch)
+        k = 0
+        while True:
+            if not (abs(omega[0]) < _DIVERGED and abs(omega[1]) < _DIVERGED and abs(omega[2]) < _DIVERGED):  # or NaN
+                diverged[s] = True
+                orientation[s, k:], velocity[s, k:] = np.nan, np.nan
+                break
+            orientation[s, k, 0], orientation[s, k, 1], orientation[s, k, 2], orientation[s, k, 3] = q
+            velocity[s, k, 0], velocity[s, k, 1], velocity[s, k, 2] = omega
+            n = min(stride, samples - 1 - k)
+            if n == 0:
+                break
+            h = n * step_s
+            before, leaving = q, _scaled(_product(omega, q, 0.0), 0.5 * h)
+            _mean(motor[s, k : k + n + 1], middle)
+            there = _turned(q, (0.25 * h * omega[0], 0.25 * h * omega[1], 0.25 * h * omega[2]))
+            omega = _creeping(eye, there, middle, at, end, behind, scratch)
+            q = _turned(q, (0.5 * h * omega[0], 0.5 * h * omega[1], 0.5 * h * omega[2]))
+            omega = _creeping(eye, q, motor[s, k + n], at, end, behind, scratch)
+            arriving = _scaled(_product(omega, q, 0.0), 0.5 * h)
+            bend = _along(_along(_along(_scaled(q, 3.0), before, -3.0), leaving, -2.0), arriving, -1.0)
+            twist = _along(_along(_along(_scaled(q, -2.0), before, 2.0), leaving, 1.0), arriving, 1.0)
+            for j in range(1, n):  # Hermite's cubic
+                x = j / n
+                inside = _along(before, _along(leaving, _along(bend, twist, x), x), x)
+                rate = _along(leaving, _along(_scaled(bend, 2.0), twist, 3 * x), x)
+                part = 1 / _square(inside)
+                spin, inside = _spin(inside, rate, 2 * part / h), _scaled(inside, math.sqrt(part))
+                orientation[s, k + j, 0], orientation[s, k + j, 1] = inside[0], inside[1]
+                orientation[s, k + j, 2], orientation[s, k + j, 3] = inside[2], inside[3]
+                velocity[s, k + j, 0], velocity[s, k + j, 1], velocity[s, k + j, 2] = spin
+            k += n
 
 
 def _still(eye: Eye, turn: Array, motor: Array, torque: Array, tension: Array) -> None:
@@ -371,3 +463,9 @@ _EYE = _typeof(
 _BATCH, _ROWS = _NUMBER[:, :, ::1], _NUMBER[:, ::1]
 run = _compiled(_run, (_EYE, *[_BATCH] * 4, numba.boolean[::1], _NUMBER, numba.int64, numba.boolean))
 still = _compiled(_still, (_EYE, _BATCH, _ROWS, _ROWS, _ROWS))
+
+
+@cache
+def creep() -> Callable[..., None]:
+    """`_creep`, compiled when it is first asked for: one plant alone needs it."""
+    return _compiled(_creep, (_EYE, *[_BATCH] * 3, numba.boolean[::1], _NUMBER, numba.int64))

@@ -242,6 +242,9 @@ class ClosedMovement:
         """The command's: the motor follows it."""
         return self.command.energy()
 
+    def excess_force(self) -> None:
+        """None: of a surrogate no elastics are known."""
+
     def measure(self, band: float = BAND, of: View = "orientation") -> Measures:
         """See `orient_eye.movement.Movement`; of an eye that turns about one axis."""
         if of == "gaze" and self.plant.surrogate.axis == "roll":  # which does not move it
@@ -330,6 +333,9 @@ class MixedMovement:
     def energy(self) -> Array:
         """See `orient_eye.movement.Movement`."""
         return merged_rows(self.which, self.some.energy(), self.others.energy())
+
+    def excess_force(self) -> None:
+        """None: of a surrogate no elastics are known."""
 
     def measure(self, band: float = BAND, of: View = "orientation") -> Measures:
         """See `orient_eye.movement.Movement`."""

@@ -1,5 +1,6 @@
 """What all plants have in common that are stepped through time."""
 
+import contextlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.commands import Command, as_command
-from orient_eye.constants import HORIZON_S, LONGEST_S, STEP_S
+from orient_eye.constants import DOUBT, HORIZON_S, LONGEST_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.motor import Motor, names, ranges
 from orient_eye.movement import Movement, SampledMovement, energy_of
@@ -83,6 +84,10 @@ class GivenMovement:
         given, time = self.given, self.plant.times(self.given.motor.shape[1])
         return energy_of(given.command, given.motor, time, given.saturated | given.limited)
 
+    def excess_force(self) -> Array | None:
+        """See `orient_eye.movement.Movement`."""
+        return None
+
 
 @dataclass(frozen=True)
 class _Some:
@@ -137,6 +142,7 @@ class SimulatedPlant(ABC):
     pulse_rates: PulseRates | None = None
     tendons: tuple[str, ...] = ()
     resumes: bool = False
+    doubt: float = DOUBT
 
     @abstractmethod
     def run(self, motor: Array, start: State) -> Run:
@@ -162,6 +168,26 @@ class SimulatedPlant(ABC):
     @abstractmethod
     def identity(self) -> dict[str, Any]:
         """See `orient_eye.plants.Plant`."""
+
+    def held(self, orientation: Array, driven: tuple[str, ...]) -> Array:
+        """See `orient_eye.plants.Plant`; one after the other."""
+        found = np.full((len(orientation), len(self.motors)), np.nan)
+        for i, each in enumerate(orientation):
+            with contextlib.suppress(InputError):  # this one is not held
+                found[i] = self.hold(each[None], driven)[0]
+        return found
+
+    def force(self, orientation: Array, motor: Array) -> Array | None:
+        """None: of this plant no elastics are known."""
+        return None
+
+    def excess_force(self, orientation: Array, motor: Array) -> Array | None:
+        """None: of this plant no elastics are known."""
+        return None
+
+    def motor_rates(self) -> Array:
+        """NaN: nothing is known of them."""
+        return np.full(len(self.motors), np.nan)
 
     def twin(self) -> "Plant | None":
         """No other plant is this one."""
@@ -208,7 +234,15 @@ class SimulatedPlant(ABC):
         endless, done = given.command.duration_s is None, motor.shape[1] > round(self._longest_s / self.step_s)
         further = partial(self._further, given.command, start, sampled) if endless and not done else None
         return SampledMovement(
-            sampled, given.command, given.saturated, given.limited, self.rest, endless=endless, further=further
+            sampled,
+            given.command,
+            given.saturated,
+            given.limited,
+            self.rest,
+            self.excess_force,
+            endless,
+            further,
+            self.doubt,
         )
 
     def _further(

@@ -10,35 +10,23 @@ option `as_published` brings back: with them its runs come out to 0.0004 deg (`o
 depend on the number of threads. A plant may be used from several Python threads at once, and in a forked child.
 """
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.eyes.elastics import Elastics
-from orient_eye.eyes.model import STANDARD_GRAVITY
-from orient_eye.motor import names
-from orient_eye.plants.elastic import ElasticPlant
+from orient_eye.plants.compiled import CompiledPlant
 from orient_eye.plants.limits import Limits
 from orient_eye.plants.simulated import Run
 from orient_eye.rig import Rig
-from orient_eye.rotations import rotation
 from orient_eye.state import State
 
 Array = NDArray[np.float64]
 _DECAY = 0.6  # of friction in an accurate step, at most
-_WORTH_A_THREAD = 2000  # steps: 0.3 ms, a few times what starting it takes
-_SLICES = 4  # a thread: they end together on a busy machine too
 
 
-class TavaresPlant(ElasticPlant):
+class TavaresPlant(CompiledPlant):
     """The reference simulator as a plant; see `orient_eye.plants.Plant`.
 
     Args:
@@ -72,66 +60,12 @@ class TavaresPlant(ElasticPlant):
     ) -> None:
         if accurate and as_published:
             raise InputError("as_published is the author's own integrator, which accurate replaces: choose one of them")
-        self._kernel = _compiled()
         options = {"eye": eye, "gravity": gravity, "as_published": as_published}
         if accurate:  # told only then: what was kept of the thesis' integrator still has this identity
             options["accurate"] = True
-        super().__init__(options, step_s=self.step_s, threads=threads, rig=rig)
-        self.elastics = Elastics.from_model(self.model)
+        super().__init__(options, rig=rig, threads=threads)
         decay = self.step_s * self.elastics.friction / np.linalg.eigvalsh(self.elastics.inertia)[0]
         self.substeps = max(1, int(np.ceil(decay / _DECAY))) if accurate else 0
-        motors = [self.model.actuator(name) for name in names(self.motors)]
-        self._per_control = np.deg2rad(1) / np.array([motor.gear[0] for motor in motors])  # joint position a deg
-        slides = [self.model.jnt_type[motor.trnid[0]] == mujoco.mjtJoint.mjJNT_SLIDE for motor in motors]
-        self._weightless = self._eye(np.array(slides))
-        weight = [self.elastics.centre_of_mass, [0, 0, -self.elastics.mass * STANDARD_GRAVITY if gravity else 0]]
-        self._weighed = self._weightless._replace(weight=np.array(weight))
-        self._fit_to_limits()
-
-    def _eye(self, slides: NDArray[np.bool_]) -> Any:
-        """The kernel's, without weight; its lines are the elastics here."""
-        e = self.elastics
-        centre, axis, sliding = e.arm_centre[e.motor], e.arm_axis[e.motor], slides[e.motor, None]
-        along = (axis * e.arm_end).sum(axis=1, keepdims=True) * axis
-        arm = np.stack(
-            [
-                centre + np.where(sliding, e.arm_end, along),
-                np.where(sliding, 0, e.arm_end - along),
-                np.where(sliding, axis, np.cross(axis, e.arm_end)),
-            ],
-            axis=1,
-        )
-        return self._kernel.Eye(
-            insertion=np.array(e.insertion),
-            via=np.array(e.via),
-            arm=arm,
-            elastic=np.stack([e.stiffness, e.rest_length], axis=1),
-            pulls=np.searchsorted(np.sort(e.motor), np.arange(len(slides) + 1)),
-            pulled=np.argsort(e.motor, kind="stable"),
-            slides=slides,
-            inertia=np.stack([e.inertia, np.linalg.inv(e.inertia)]),
-            friction=e.friction,
-            weight=np.zeros((2, 3)),
-        )
-
-    def elastic_torque(self, turn: Array, motor: Array) -> tuple[Array, Array]:
-        """Torque of the elastics [N m] (n, 3) and their tension [N] (n, tendons); 3.2 to 3.5.
-
-        Args:
-            turn: rotation matrices of the eye, (n, 3, 3).
-            motor: positions [deg], (n, motors).
-        """
-        return self._still(self._weightless, turn, motor)
-
-    def torque(self, orientation: Array, motor: Array) -> Array:
-        """See `orient_eye.plants.elastic.ElasticPlant`."""
-        return self._still(self._weighed, rotation(orientation).as_matrix(), motor)[0]
-
-    def _still(self, eye: Any, turn: Array, motor: Array) -> tuple[Array, Array]:
-        torque, tension = np.empty((len(motor), 3)), np.empty((len(motor), len(self.tendons)))
-        turns = np.require(np.broadcast_to(turn, (len(motor), 3, 3)), float, ["C", "W"])
-        self._kernel.still(eye, turns, motor * self._per_control, torque, tension)
-        return torque, tension
 
     def run(self, motor: Array, start: State) -> Run:
         """See `orient_eye.plants.simulated.SimulatedPlant`."""
@@ -147,24 +81,5 @@ class TavaresPlant(ElasticPlant):
             )  # fmt: skip
             np.rad2deg(velocity[part], out=velocity[part])
 
-        worth = saccades * samples * max(1, 4 * self.substeps) // _WORTH_A_THREAD
-        threads = min(self.threads or os.cpu_count() or 1, worth)
-        if threads < 2:
-            move(slice(None))
-            return orientation, velocity, tension, diverged
-        size = -(-saccades // (_SLICES * threads))
-        with ThreadPoolExecutor(threads) as pool:  # of this call: none is shared, none is missing in a forked child
-            list(pool.map(move, (slice(first, first + size) for first in range(0, saccades, size))))
+        self._in_slices(saccades, saccades * samples * max(1, 4 * self.substeps), move)
         return orientation, velocity, tension, diverged
-
-
-def _compiled() -> ModuleType:
-    """The kernel; Numba is imported with it, and not before."""
-    try:
-        import_module("numba")
-    except ImportError as error:
-        raise InputError(
-            f"plant 'tavares' is compiled by Numba, which cannot be imported ({error}): pip install numba, or take "
-            "plant 'mujoco'"
-        ) from error
-    return import_module("orient_eye.plants.elastic_kernel")
