@@ -55,8 +55,9 @@ def measures(count: int, **fields: Array | float) -> Measures:
 
 def reward(measured: Measures, energy: Array, target: Array, judge: str = "orientation") -> Reward:
     """Of a movement that spent this energy."""
-    movement: Any = SimpleNamespace(energy=lambda: energy)  # all that a judge asks of it beside its measures
-    return JUDGES[judge].reward(movement, measured, target, WEIGHTS)
+    # All that a judge asks of it beside its measures; its elastics are not known.
+    movement: Any = SimpleNamespace(energy=lambda: energy, excess_force=lambda: None)
+    return JUDGES[judge].reward(movement, measured, target, {**WEIGHTS, "force": 1.0})
 
 
 def horizontal(start: Any, target: Any, task: SaccadeTask = TASK) -> tuple[State, Array]:

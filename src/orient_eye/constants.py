@@ -4,6 +4,8 @@ SPEED_LIMIT = 7200.0
 """V [deg/s], to which a varying C brings the motor (thesis, after 4.18)."""
 BAND = 0.01
 """Settling band: share of the amplitude around the end (thesis 4.4.2)."""
+DOUBT = 1e-6
+"""Share of the amplitude: doubt about what a simulated saccade will still do that changes no measure by as much."""
 HORIZON_S = 0.5
 """How long a simulated saccade lasts."""
 YAW_LIMIT_DEG = 35.0

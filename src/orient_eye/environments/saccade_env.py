@@ -3,6 +3,8 @@
 env = gymnasium.make("OrientEye/Saccade-v0", plant="mujoco")
 observation, info = env.reset(seed=0, options={"start_yaw_deg": 0.0, "target_yaw_deg": 20.0})
 observation, reward, terminated, truncated, info = env.step(action)
+
+In all directions, by three motors: gymnasium.make("OrientEye/Saccade-v0", plant="tavares", targets="gaze").
 """
 
 from typing import Any, ClassVar
@@ -34,16 +36,26 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     | 1 | D, final motor position | -80 deg (lpf), -40 deg (mujoco, tavares) | +80, +40 deg |
     | 2 | k0, gain of the integrator | 5 1/s | 40 1/s |
 
+    With `targets="gaze"` all three motors are driven, and their nine numbers are told from a usual command, the action
+    of zeros (`orient_eye.task.residual_actions`); on the thesis' eye:
+    | index | what | -1 | +1 |
+    |---|---|---|---|
+    | 0, 3, 6 | B of motor 1, 2, 3, times the usual one | 0.55 | 1.82 |
+    | 1, 4, 7 | D, beside the usual one | -5.7, -3.1, -5.7 deg | +5.7, +3.1, +5.7 deg |
+    | 2, 5, 8 | k0, times the usual one | 0.67 | 1.49 |
+
     ## Reward
     lambda_a R_a + lambda_e R_e + lambda_d R_d + lambda_o R_o (thesis 4.32; `orient_eye.task.judge`), between
-    -1e10 and 0: about -7e4 for a good saccade of 30 deg. With `log_reward=True`, -log10 of its size in
+    -1e10 and 0: about -7e4 for a good saccade of 30 deg. With gaze targets accuracy is that of the gaze, and a fifth
+    term is the force of the fixation beyond the least (docs/gaze.md). With `log_reward=True`, -log10 of its size in
     units of 1e5, which has the same optimal policy and is easier to learn.
 
     ## Start and end of an episode
     Start and target are drawn uniformly from +-35 deg of yaw, or chosen: `reset(options={"start_yaw_deg": 0.0,
-    "target_yaw_deg": 20.0})`, or by orientation, `options={"target": [w, x, y, z]}`. The eye rests at the start. The
-    first step ends the episode (`terminated`); `info` then holds the action in units, the measures and the reward's
-    weighted terms (`orient_eye.task.table`).
+    "target_yaw_deg": 20.0})`, or by orientation, `options={"target": [w, x, y, z]}`. Gaze targets lie anywhere up to
+    30 deg from straight ahead and have a pitch too, positive down: `start_pitch_deg`, `target_pitch_deg`; an angle that
+    is left out is drawn. The eye rests at the start. The first step ends the episode (`terminated`); `info` then holds
+    B, D and k0 in units, the measures and the reward's weighted terms (`orient_eye.task.table`).
 
     ## Pictures
     An episode is one step, so what `render` returns after it is the whole movement: `render_mode="rgb_array_list"`
@@ -59,7 +71,7 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         log_reward: give the log reward.
         render_mode: "human", "rgb_array", "rgb_array_list", or None.
         task_options: keywords of `orient_eye.task.saccade.SaccadeTask.of_case`: case ("1" unless given), targets,
-            driven, weights, judge, band, speed_limit, horizon_s.
+            driven, weights, judge, actions, action_options, band, speed_limit, horizon_s.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]  # gymnasium's own form

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.commands import Command, path_energy
-from orient_eye.constants import BAND
+from orient_eye.constants import BAND, DOUBT
 from orient_eye.movement.measures import Measures, View, measure, merged, merged_rows
 from orient_eye.movement.tail import Tail, tail_of
 from orient_eye.movement.trajectory import Trajectory
@@ -56,6 +56,13 @@ class Movement(Protocol):
         """Integral of the squared speeds of the motors as they moved [deg^2/s], (saccades,); thesis 4.35."""
         ...
 
+    def excess_force(self) -> Array | None:
+        """Force of the fixation in which it ends, beyond the least that holds this gaze [N^2], (saccades,).
+
+        None on a plant of which no elastics are known (`orient_eye.plants.fixation`).
+        """
+        ...
+
     def trajectory(self) -> Trajectory:
         """The movement over time."""
         ...
@@ -73,6 +80,10 @@ def _known(rest: Array, motor: Array) -> Array:
     return rest
 
 
+def _unknown(orientation: Array, motor: Array) -> None:
+    return None
+
+
 @dataclass(frozen=True)
 class SampledMovement:
     """A movement known at samples.
@@ -83,9 +94,11 @@ class SampledMovement:
         saturated: see `Movement`.
         limited: see `Movement`.
         rest: orientations (saccades, 4) in which the eye rests when its motors stand at (saccades, motors).
+        excess: of orientations (saccades, 4) held by motors at (saccades, motors), see `Movement.excess_force`.
         endless: whether the saccades go on after their samples, and what follows counts; else it is as if there were
             nothing.
         further: of saccades that go on, some of them (an index) over a longer time; None where this is the longest.
+        doubt: share of the amplitude by which a measure may be wrong because a saccade that goes on was not stepped on.
     """
 
     sampled: Trajectory
@@ -93,8 +106,10 @@ class SampledMovement:
     saturated: NDArray[np.bool_]
     limited: NDArray[np.bool_]
     rest: Callable[[Array], Array]
+    excess: Callable[[Array, Array], Array | None] = _unknown
     endless: bool = False
     further: "Callable[[NDArray[np.intp]], SampledMovement] | None" = None
+    doubt: float = DOUBT
 
     @cached_property
     def stands(self) -> Array:
@@ -120,7 +135,7 @@ class SampledMovement:
         found = measure(self.sampled, self.final, band=band, of=of, tail=self.tail)
         if self.tail is None or self.further is None:
             return found
-        goes_on = ~self.tail.sure(found.amplitude_deg, found.overshoot, band)
+        goes_on = ~self.tail.sure(found.amplitude_deg, found.overshoot, band, self.doubt)
         if not goes_on.any():
             return found
         movement, rows = self._later(goes_on)
@@ -138,6 +153,10 @@ class SampledMovement:
             movement, rows = self._later(moving)
             energy = merged_rows(moving, movement.energy()[rows], energy[~moving])
         return energy
+
+    def excess_force(self) -> Array | None:
+        """See `Movement.excess_force`."""
+        return self.excess(self.final, self.stands)
 
     def _later(self, which: NDArray[np.bool_]) -> "tuple[SampledMovement, NDArray[np.bool_]]":
         """A longer movement that has these saccades, kept for the next question, and which of its own they are."""

@@ -207,14 +207,15 @@ def _seen_gaze(orientation: Array, final: Array, velocity: Array) -> tuple[Array
     """The same of the direction of gaze."""
     gaze, end = rotations.gaze(orientation), rotations.gaze(final)
     start = gaze[:, 0]
-    amplitude, distance = (
-        rotations.angle_between_directions(start, end),
-        rotations.angle_between_directions(gaze, end[:, None]),
-    )
+    amplitude = rotations.angle_between_directions(start, end)
+    apart = gaze - end[:, None]
+    distance = np.rad2deg(2 * np.arcsin(np.minimum(np.sqrt(_dot(apart, apart)) / 2, 1)))
     ahead = end - (end * start).sum(axis=-1, keepdims=True) * start  # along the great circle, where it leaves the start
     ahead /= np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-300)
-    turned = np.rad2deg(np.arctan2(np.einsum("ntk,nk->nt", gaze, ahead), np.einsum("ntk,nk->nt", gaze, start)))
-    return amplitude, distance, turned, np.linalg.norm(np.cross(velocity, gaze), axis=-1)
+    along, across = _dot(gaze, ahead[:, None]), _dot(gaze, start[:, None])
+    rolling = _dot(velocity, gaze)
+    speed = np.sqrt(np.maximum(_dot(velocity, velocity) - rolling**2, 0))
+    return amplitude, distance, np.rad2deg(np.arctan2(along, across)), speed
 
 
 def finished(

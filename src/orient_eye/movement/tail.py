@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orient_eye import rotations
+from orient_eye.constants import DOUBT
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.rotations import rotation
 
@@ -23,7 +24,6 @@ _HIDDEN = 10.0  # what passes by the exponential by so little may be so many tim
 _FEIGNED = 100.0  # and more if it leads to an end beside where the eye rests, which a slow part of the motion feigns
 _ASIDE = 1e-6  # of the amplitude, and _LEAST: how far that may lie beside, as MuJoCo's motors yield a little
 _LEAST = np.deg2rad(2e-5)
-_SURE = 1e-6  # of the amplitude: doubt that changes no measure by as much
 _SMALL_DEG = 0.01  # amplitude below which doubt is held against this one
 _FARTHER = 0.2  # of an overshoot: doubt that makes it no larger
 _STANDS = 1e-4  # of its travel: a motor this near its end has done all its work but for 1e-8
@@ -45,7 +45,7 @@ class Tail:
     rate: Array
     doubt: Array
 
-    def sure(self, amplitude_deg: Array, overshoot: Array, band: float) -> NDArray[np.bool_]:
+    def sure(self, amplitude_deg: Array, overshoot: Array, band: float, doubt: float = DOUBT) -> NDArray[np.bool_]:
         """Of which saccades the tail changes nothing that was measured but as it says, (saccades,).
 
         Either nothing else than the exponential is left, or the eye has been farther beyond its end than the doubt
@@ -55,11 +55,12 @@ class Tail:
             amplitude_deg: of the saccades, (saccades,); NaN where they failed.
             overshoot: up to the last sample, share of the amplitude, (saccades,).
             band: settling band, share of the amplitude.
+            doubt: share of the amplitude by which a measure may be wrong.
         """
         amplitude = np.deg2rad(amplitude_deg)
         with np.errstate(invalid="ignore"):
             inside = np.linalg.norm(self.way, axis=1) + self.doubt < band * amplitude
-            limit = np.where(inside, _SURE, _SURE * band) * np.maximum(amplitude, np.deg2rad(_SMALL_DEG))
+            limit = doubt * np.where(inside, 1.0, band) * np.maximum(amplitude, np.deg2rad(_SMALL_DEG))
             farther = inside & (self.doubt <= _FARTHER * overshoot * amplitude)
             return np.asarray((self.doubt <= limit) | farther | np.isnan(amplitude))
 

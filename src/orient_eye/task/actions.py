@@ -10,7 +10,7 @@ action is a class with these members and a line in `ACTIONS`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -83,6 +83,15 @@ class ActionSpace(ABC):
     def identity(self) -> dict[str, Any]:
         """What makes these actions these ones, in plain values: `actions`, their kind, and its options."""
 
+    @property
+    def plain(self) -> "ActionSpace":
+        """The same commands, told without regard to the saccade: there the best action is searched and told."""
+        return self
+
+    def as_plain(self, start: State, target: Array, action: Array) -> Array:
+        """The actions (saccades, numbers) of `plain` that make the same commands; arguments as `command`'s."""
+        return action
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Of the numbers: symbols, of several motors B_motor1, B_motor2, ..."""
@@ -140,6 +149,7 @@ class PulseStepActions(ActionSpace):
             brings the motor to the speed limit.
         speed_limit: V [deg/s], for a varying C; None for that of the slowest driven motor, or the thesis' 7200 where
             none is limited.
+        rates: bounds of B and k0, or a mapping of them; None for the plant's own.
 
     Raises:
         InputError: motors the plant has not, an unknown pulse, a C that is none, or a speed limit that is none.
@@ -154,6 +164,7 @@ class PulseStepActions(ActionSpace):
         pulse: str = "1",
         C: float | str | None = None,
         speed_limit: float | None = None,
+        rates: PulseRates | Mapping[str, Sequence[float]] | None = None,
     ) -> None:
         self.plant, self.driven, self.pulse = plant, tuple(driven), pulse
         self.index = check_driven(plant.motors, self.driven, plant.name)
@@ -171,14 +182,17 @@ class PulseStepActions(ActionSpace):
         if not 0 < speed_limit < np.inf:
             raise InputError(f"the speed limit must be positive and finite, got {speed_limit}")
         self.C = onset.fixed if onset and C is None else C
-        rates = plant.pulse_rates or PulseRates(B_RANGE, K0_RANGE)
-        log = plant.pulse_rates is not None
+        self.rates = PulseRates(**{k: (v[0], v[1]) for k, v in rates.items()}) if isinstance(rates, Mapping) else rates
+        log = self.rates is not None or plant.pulse_rates is not None
+        rates = self.rates or plant.pulse_rates or PulseRates(B_RANGE, K0_RANGE)
         self.numbers = tuple(
             number
             for motor in (plant.motors[i] for i in self.index)
             for number in (
                 Number("B", "1/s", motor.name, *rates.B, log=log, fine=0.05),
-                Number("D", motor.unit, motor.name, *_finite(motor.working), fine=0.002),
+                Number(
+                    "D", motor.unit, motor.name, *_finite(motor.working), fine=0.002 if len(self.index) == 1 else 0.006
+                ),
                 Number("k0", "1/s", motor.name, *rates.k0, log=log, fine=0.03, cliff=True),
             )
         )
@@ -191,6 +205,7 @@ class PulseStepActions(ActionSpace):
             "pulse": self.pulse,
             "C": self.C,
             "speed_limit": self.speed_limit if self.C == "varying" else None,
+            **({} if self.rates is None else {"rates": {"B": list(self.rates.B), "k0": list(self.rates.k0)}}),
             "low": self.low.tolist(),
             "high": self.high.tolist(),
         }
@@ -222,7 +237,10 @@ def _finite(working: tuple[float, float]) -> tuple[float, float]:
     return working
 
 
-ACTIONS: Registry[Callable[..., ActionSpace]] = Registry("action", {PulseStepActions.kind: PulseStepActions})
+ACTIONS: Registry[Callable[..., ActionSpace]] = Registry(
+    "action",
+    {PulseStepActions.kind: PulseStepActions, "residual": "orient_eye.task.residual_actions:ResidualActions"},
+)
 """Kind to class; each takes the plant, the driven motors, and options of its own."""
 
 

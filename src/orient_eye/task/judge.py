@@ -72,6 +72,11 @@ class Judge:
         """Of the terms."""
         return tuple(term.name for term in self.terms)
 
+    @property
+    def any_weights(self) -> dict[str, float]:
+        """Some weights, for a task whose weights do not matter; none of the force, which not every plant knows."""
+        return {name: 0.0 if name == "force" else 1.0 for name in self.names}
+
     def weights(self, values: Mapping[str, float] | Sequence[float]) -> dict[str, float]:
         """Weights by the name of their term, from such a mapping or from numbers in the order of the terms.
 
@@ -136,13 +141,22 @@ def _overshoot(movement: Movement, measures: Measures, target: Array) -> Array:
     return -measures.overshoot
 
 
+def _force(movement: Movement, measures: Measures, target: Array) -> Array:
+    """R_f = -(S - S_min) [N^2], S the force of the fixation in which the saccade ends and S_min the least of that gaze.
+
+    0 where no elastics are known. The plain S would draw large saccades short (`orient_eye.plants.fixation`).
+    """
+    excess = movement.excess_force()
+    return np.zeros(len(target)) if excess is None else -np.nan_to_num(np.maximum(excess, 0.0))
+
+
 _COMMON = (Term("energy", _energy), Term("duration", _duration, -1.0), Term("overshoot", _overshoot, -10.0))
 
 JUDGES: Registry[Judge] = Registry(
     "judge",
     {
         "orientation": Judge("orientation", (Term("accuracy", _accuracy, -1.0), *_COMMON)),
-        "gaze": Judge("gaze", (Term("accuracy", _gaze_accuracy, -1.0), *_COMMON)),
+        "gaze": Judge("gaze", (Term("accuracy", _gaze_accuracy, -1.0), *_COMMON, Term("force", _force))),
     },
     Judge,
 )

@@ -30,8 +30,10 @@ from platformdirs import user_cache_path
 from orient_eye.errors import InputError
 from orient_eye.files import write_text
 from orient_eye.resources import data_folder
-from orient_eye.task.actions import B_RANGE, K0_RANGE
+from orient_eye.task.actions import B_RANGE, K0_RANGE, PulseStepActions
+from orient_eye.task.judge import JUDGES
 from orient_eye.task.solved_weights import ChosenSaccade, Resolved, Steps, action_of, resolve, solve_at, told
+from orient_eye.task.targets import make_targets
 
 if TYPE_CHECKING:
     from orient_eye.task.saccade import Outcome, SaccadeTask
@@ -52,6 +54,10 @@ ERROR_DEG, ERROR_AT_DEG = 0.25, 5.0
 ERROR_SHARE = 0.05
 """What that error costs by `by_rule` at least, in units of what that saccade costs: a policy is a few percent from the
 best, and may not spend them on the end point."""
+SLOW_OVERSHOOT = 0.09
+"""Weight of the overshoot of saccades in all directions, over that of horizontal ones."""
+FORCE = 0.0075
+"""Weight of the force of fixations [1/N^2] over that of the accuracy."""
 _GRID, _ROUNDS = 24, 4  # of the search of the fastest saccade
 
 
@@ -80,6 +86,8 @@ def with_known_weights(task: SaccadeTask) -> SaccadeTask:
 
 def solve(task: SaccadeTask, error_deg: float | None = None) -> tuple[dict[str, float], str]:
     """Weights solved on the task's plant, and where they are from, in words; steps 3 to 5 above."""
+    if "force" in task.weights:
+        return in_all_directions(task, error_deg)
     if task.plant.pulse_rates is not None or error_deg is not None:
         return by_rule(task, ERROR_DEG if error_deg is None else error_deg)
     try:
@@ -93,6 +101,38 @@ def solve(task: SaccadeTask, error_deg: float | None = None) -> tuple[dict[str, 
         return weights, f"solved by thesis 4.4.5 at the fastest saccade with {OVERSHOOT:.0%} overshoot, {command}"
     except InputError:
         return by_rule(task)
+
+
+def in_all_directions(task: SaccadeTask, error_deg: float | None = None) -> tuple[dict[str, float], str]:
+    """Weights of a task whose targets are directions of gaze, from the same plant's saccades about one axis.
+
+    Accuracy and duration weigh as there. Overshoot weighs `SLOW_OVERSHOOT` of that: where the eye is slow, up and down,
+    4.4.5 gives so little, the best saccade is the same, and the cliff below the best k0 is gentler. The force of
+    fixations weighs `FORCE` in proportion to the accuracy, and nothing where no elastics are known.
+
+    Args:
+        task: its weights do not matter.
+        error_deg: end-point error with which one can live [deg], at 5 deg; None for 4.4.5.
+    """
+    targets, plain = make_targets(None, task.plant), task.actions.plain
+    of_pulse = {key: plain.identity().get(key) for key in ("pulse", "C", "speed_limit")}
+    options = {key: value for key, value in of_pulse.items() if value is not None}
+    actions = PulseStepActions(task.plant, targets.driven, **options)
+    some = JUDGES[targets.of].any_weights
+    simple = replace(task, actions=actions, targets=targets, judge=targets.of, weights=some)
+    if error_deg is None:
+        simple = with_known_weights(simple)
+        found, where = dict(simple.weights), simple.weights_from
+    else:
+        found, where = solve(simple, error_deg)
+    elastics = task.plant.force(np.empty((0, 4)), np.empty((0, len(task.plant.motors)))) is not None
+    weights = {
+        **found,
+        "overshoot": SLOW_OVERSHOOT * found["overshoot"],
+        "force": FORCE * found["accuracy"] if elastics else 0.0,
+    }
+    unknown = "" if elastics else "; no weight of the force, as no elastics are known"
+    return weights, f"of {targets.name} saccades, the overshoot's times {SLOW_OVERSHOOT:g}{unknown} ({where})"
 
 
 def fastest(task: SaccadeTask, size_deg: float | None = None) -> tuple[Resolved, Outcome]:
@@ -185,11 +225,11 @@ def bounds(task: SaccadeTask) -> dict[str, tuple[float, float]]:
 
 def compared_with_thesis(task: SaccadeTask) -> str:
     """One line: how bounds and weights differ from those of the thesis' low-pass eye in the same case."""
-    own = {(n.symbol, n.low, n.high) for n in task.actions.numbers}
+    own = {(n.symbol, n.low, n.high) for n in task.actions.plain.numbers}
     of_thesis = {"B": B_RANGE, "k0": K0_RANGE}
     differ = [s for s, ends in of_thesis.items() if any(symbol == s and (lo, hi) != ends for symbol, lo, hi in own)]
     told = [f"{s} from {of_thesis[s][0]:g} to {of_thesis[s][1]:g} 1/s" for s in differ]
-    actions = task.actions.identity()
+    actions = task.actions.plain.identity()
     for entry in json.loads((data_folder("models") / "weights.json").read_text(encoding="utf-8")):
         key = entry["of"]
         same = all(key["actions"].get(name) == actions.get(name) for name in ("actions", "pulse", "C"))
@@ -198,14 +238,14 @@ def compared_with_thesis(task: SaccadeTask) -> str:
             told += [f"{1 / r:.2g} times the weight of {name}" for name, r in shares.items() if r and abs(r - 1) > 0.01]
             break
     else:
-        told.append("no weights for this case")
+        told.append("no weights for this case" if task.judge == "orientation" else "no saccades in all directions")
     return f"the thesis' eye has {', '.join(told)}" if told else "bounds and weights are those of the thesis' eye"
 
 
 def _key(task: SaccadeTask) -> dict[str, Any]:
     """What shipped weights are of, in plain values."""
-    identity = task.identity()
-    actions = {key: value for key, value in identity["actions"].items() if key not in ("low", "high")}
+    identity = task.plain.identity()
+    actions = {key: value for key, value in identity["actions"].items() if key not in ("low", "high", "rates")}
     kept = {key: identity[key] for key in ("plant", "judge", "band")}
     return {**kept, "actions": actions, "targets": task.targets.name}
 

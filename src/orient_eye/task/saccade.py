@@ -7,9 +7,10 @@
 Command, movement, measures, reward: each is asked of the part that knows it, and none is asked what kind it is.
 """
 
+import inspect
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -95,6 +96,21 @@ class SaccadeTask:
         if not 0 < self.band < 1:
             raise InputError(f"the settling band is a share of the amplitude between 0 and 1, got {self.band}")
 
+    def _force_known(self) -> "SaccadeTask":
+        """Itself, if nothing is to be judged of which the plant knows nothing."""
+        nobody = np.empty((0, 4)), np.empty((0, len(self.plant.motors)))
+        if self.weights.get("force") and self.plant.force(*nobody) is None:
+            raise InputError(
+                f"of plant {self.plant.name!r} no elastics are known, so that the force of a fixation cannot be "
+                "judged: give it the weight 0"
+            )
+        return self
+
+    @property
+    def plain(self) -> "SaccadeTask":
+        """The same task with actions that are told without regard to the saccade."""
+        return self if self.actions.plain is self.actions else replace(self, actions=self.actions.plain)
+
     @classmethod
     def of_case(
         cls,
@@ -105,7 +121,8 @@ class SaccadeTask:
         driven: Sequence[str] | None = None,
         weights: Mapping[str, float] | Sequence[float] | None = None,
         judge: str | None = None,
-        actions: str = "pulse-step",
+        actions: str | None = None,
+        action_options: Mapping[str, Any] | None = None,
         band: float = BAND,
         speed_limit: float | None = None,
         horizon_s: float | None = None,
@@ -121,7 +138,8 @@ class SaccadeTask:
             weights: of the reward's terms, by name or in their order; None for those of the case on this plant, which
                 are solved where nobody has solved them (`orient_eye.task.known_weights`).
             judge: a name of `orient_eye.task.judge.JUDGES`; None for that of the targets.
-            actions: a name of `orient_eye.task.actions.ACTIONS`.
+            actions: a name of `orient_eye.task.actions.ACTIONS`; None for the kind that suits the targets.
+            action_options: further keywords of that kind.
             band: settling band, share of the amplitude.
             speed_limit: V [deg/s], for a varying C; None for the motors' own.
             horizon_s: of a simulated saccade; None for the plant's own.
@@ -132,14 +150,23 @@ class SaccadeTask:
         case = CASES[case] if isinstance(case, str) else case
         if targets is None or isinstance(targets, str):
             targets = make_targets(targets, plant, driven=None if driven is None else tuple(driven))
-        meant = ACTIONS[actions](plant, driven or targets.driven, pulse=case.pulse, C=case.C, speed_limit=speed_limit)
+        make, options = ACTIONS[actions or targets.actions], dict(action_options or {})
+        if targets.pulse_rates is not None:
+            options["rates"] = targets.pulse_rates
+        unknown = set(options) - set(inspect.signature(make).parameters)
+        if unknown:
+            raise InputError(
+                f"{actions or targets.actions!r} actions, of {targets.name} targets, have no option "
+                f"{', '.join(sorted(unknown))}; leave it out, or choose other targets"
+            )
+        meant = make(plant, driven or targets.driven, pulse=case.pulse, C=case.C, speed_limit=speed_limit, **options)
         judge = judge or targets.of
-        told = JUDGES[judge].weights(dict.fromkeys(JUDGES[judge].names, 1.0) if weights is None else weights)
+        told = JUDGES[judge].weights(JUDGES[judge].any_weights if weights is None else weights)
         if horizon_s is None:
-            horizon_s = plant.horizon_s or HORIZON_S
+            horizon_s = targets.horizon_s or plant.horizon_s or HORIZON_S
         task = cls(plant, meant, targets, told, judge, band, horizon_s)
         if weights is not None:
-            return task
+            return task._force_known()
         return with_known_weights(task)
 
     def identity(self) -> dict[str, Any]:
@@ -169,16 +196,18 @@ class SaccadeTask:
         """
         try:
             own = restore_plant(identity["plant"]) if plant is None else plant
-            driven = tuple(identity["actions"]["driven"])
-            return cls(
+            targets = restore_targets(identity["targets"], own, tuple(identity["actions"]["driven"]))
+            horizon_s = identity["horizon_s"] if plant is None else targets.horizon_s or own.horizon_s
+            task = cls(
                 own,
                 restore_actions(identity["actions"], own),
-                restore_targets(identity["targets"], own, driven),
+                targets,
                 identity["weights"],
                 str(identity["judge"]),
                 float(identity["band"]),
-                float((identity["horizon_s"] if plant is None else own.horizon_s) or HORIZON_S),
+                float(horizon_s or HORIZON_S),
             )
+            return task._force_known()
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             if isinstance(error, InputError):
                 raise

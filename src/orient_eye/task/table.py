@@ -21,7 +21,8 @@ def outcome_columns(task: SaccadeTask, start: State, target: Array, action: Arra
     is driven and the numbers of the action; C where the pulse has one; where the eye comes to rest and by how much
     that is off; the measures; the reward with its weighted terms; and what went wrong.
     """
-    targets, actions, measures = task.targets, task.actions, outcome.measures
+    targets, actions, measures = task.targets, task.actions.plain, outcome.measures
+    action = task.actions.as_plain(start, target, action)
     columns: dict[str, Any] = {}
     for name, orientation in (("start", start.orientation), ("target", target)):
         columns |= _angles(name, targets.angles, targets.angles_of(orientation))

@@ -14,6 +14,7 @@ TARGETS: "Registry[Callable[..., Targets]]" = Registry(
         "horizontal": "orient_eye.task.targets:AxisTargets",
         "vertical": "orient_eye.task.targets:vertical",
         "torsional": "orient_eye.task.targets:torsional",
+        "gaze": "orient_eye.task.gaze_targets:GazeTargets",
     },
 )
 """Name to a set; each takes the plant, and options of its own."""

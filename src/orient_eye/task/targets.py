@@ -8,6 +8,8 @@ Another set is a class with the members of `Targets` and a line in `TARGETS`.
 """
 
 import contextlib
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +20,7 @@ from orient_eye.constants import YAW_LIMIT_DEG
 from orient_eye.errors import InputError
 from orient_eye.motor import check_driven, names
 from orient_eye.movement.measures import View
-from orient_eye.plants import Plant
+from orient_eye.plants import Plant, PulseRates
 from orient_eye.state import State, unit
 from orient_eye.task.target_sets import TARGETS
 
@@ -34,6 +36,11 @@ class Targets(Protocol):
         driven: motors that can make these saccades.
         of: what of a saccade counts, "orientation" or "gaze".
         limit_deg: how far from straight ahead they are drawn.
+        actions: kind of action that suits them, in `orient_eye.task.actions.ACTIONS`.
+        pulse_rates: bounds of B and k0 that hold their best pulse-steps; None where the plant's do.
+        learning: settings of a training that suit them where they differ from the usual ones
+            (`orient_eye.learning.config.TrainConfig`).
+        horizon_s: how long such a saccade lasts on a plant that needs a horizon; None for as long as the plant says.
     """
 
     name: str
@@ -41,6 +48,10 @@ class Targets(Protocol):
     driven: tuple[str, ...]
     of: View
     limit_deg: float
+    actions: str
+    pulse_rates: PulseRates | None
+    horizon_s: float | None
+    learning: Mapping[str, Any]
 
     def draw(self, count: int, random: np.random.Generator) -> tuple[State, Array]:
         """Starts, which the plant can hold, and target orientations (count, 4)."""
@@ -122,6 +133,10 @@ class AxisTargets:
     """
 
     of: View = "orientation"
+    actions = "pulse-step"
+    pulse_rates = None
+    horizon_s = None
+    learning: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(
         self,
