@@ -6,14 +6,17 @@
 Simplices from the best of a sample in each basin, begun anew around what they found, for many saccades side by side,
 so that every step is one batch of the plant; in between each saccade tries what was found for those most like it. It
 needs no gradient, so that neither the cliff of the reward in k0 (an overshoot costs decades) nor the kink of the
-settling time misleads it. What it knows of the numbers of an action stands in the task's action space.
+settling time misleads it. Of nine numbers, evolution strategies do the same (`search.evolution`). What the search knows
+of the numbers of an action stands in the task's action space.
 
 A plant that has a quicker twin is searched on the twin. What is told is the plant's own reward, and where that is not
 the twin's, the search goes on on the plant.
 """
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +24,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from orient_eye.errors import InputError
+from orient_eye.search.evolution import evolve
 from orient_eye.search.simplex import around, climb
 from orient_eye.state import State
+from orient_eye.task.actions import ActionSpace
 from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
@@ -30,6 +35,7 @@ _SAMPLE = 40  # actions a saccade, of three numbers
 _NEAR_LIKELY = 1.5  # of a number's `fine`: spread around a value that is likely
 _APART = 1 / 6  # of a range: from there on an action is on another side of a cliff
 _LIKE = 4  # saccades whose actions are tried
+_DOUBT = 1e-3  # of a plant on which saccades of many numbers are searched
 _TWINS = 1e-4  # of |R|: as far as a twin's reward may be from the plant's own
 
 
@@ -57,6 +63,9 @@ _ROUNDS = (
     _Round(1, 30, 1.0),
     _Round(1, 30, 0.3),
 )
+_FEW = 5  # numbers: of more than these, evolutions
+_GENERATIONS = ((8, 35, 1.0), (2, 60, 0.7), (1, 200, 0.3))
+"""Of every round: evolutions of a saccade, their generations, and how wide they begin in units of `fine`."""
 _ACROSS = 0.05  # of its step, by which one along a ridge is wide
 
 
@@ -87,7 +96,8 @@ def find_optimum(
     """Search the best action of each saccade.
 
     Args:
-        task: plant, command and reward.
+        task: plant, command and reward. The best actions are those of its plain task (`SaccadeTask.plain`): what its
+            own actions know of usual commands is where the search begins, and not where it ends.
         start: where each saccade begins, of (saccades,).
         target: desired orientations, (saccades, 4).
         random: generator of the search.
@@ -99,9 +109,12 @@ def find_optimum(
     """
     if not 0 < effort < np.inf:
         raise InputError(f"the effort of a search is a number above 0, 1 for the usual one, got {effort}")
-    twin = task.plant.twin()
+    usual, task, twin = task.actions, task.plain, task.plant.twin()
+    if usual is not task.actions:
+        twin = copy.copy(task.plant) if twin is None else twin
+        twin.doubt = _DOUBT
     search = _Search(task if twin is None else replace(task, plant=twin), start, target, random, effort, progress)
-    x, value = search.run()
+    x, value = search.run(usual)
     performed = search.performed
     if twin is not None:
         own = _Search(task, start, target, random, effort)
@@ -135,20 +148,27 @@ class _Search:
         self.fine = np.array([number.fine for number in numbers])
         cliff = np.array([number.cliff for number in numbers])
         self.cliff = cliff if cliff.any() else ~cliff
-        self.effort = effort * (self.size / 3) ** 0.5
-        self.left = self.rounds = sum(self._iterations(each) for each in _ROUNDS)
+        self.effort = effort * (1.0 if self.size > _FEW else (self.size / 3) ** 0.5)
+        steps = [g for _, g, _ in _GENERATIONS] if self.size > _FEW else [each.iterations for each in _ROUNDS]
+        self.left = self.rounds = sum(map(self._times, steps))
 
-    def _iterations(self, each: _Round) -> int:
-        return max(1, round(each.iterations * self.effort))
+    def _times(self, usual: int) -> int:
+        return max(1, round(usual * self.effort))
 
-    def run(self) -> tuple[Array, Array]:
-        """The best actions (saccades, numbers) and their values."""
+    def run(self, first: ActionSpace) -> tuple[Array, Array]:
+        """The best actions (saccades, numbers) and their values.
+
+        Args:
+            first: actions from which half of the sample is drawn, where they are not the task's own.
+        """
+        if self.size > _FEW:
+            return self._evolved(first)
         # Most candidates have likely numbers (D: they end near the target): the search is about the others.
         likely = (self.task.actions.to_unit(self.task.actions.likely(self.target)) + 1) / 2
         known = np.asarray(np.isfinite(likely).all(axis=0))
         usual, every = np.where(known, likely, 0.0), np.arange(self.saccades)
         alike = self._alike()
-        best, value = self._basins(*self._sample(usual, known), _ROUNDS[0].simplices)
+        best, value = self._basins(*self._sample(usual, known, first), _ROUNDS[0].simplices)
         last = best[:, :1]
         for i, each in enumerate(_ROUNDS):
             if i and alike.shape[1]:
@@ -159,6 +179,27 @@ class _Search:
             points, values = self._climb(self._simplices(best[:, :simplices], last, each), each)
             last = points[every, values[:, :, 0].argmax(axis=1)]
             best, value = _best_first(points[:, :, 0], values[:, :, 0])
+        return best[:, 0], value[:, 0]
+
+    def _evolved(self, first: ActionSpace) -> tuple[Array, Array]:
+        """The same of many numbers, by evolution: from several basins, then again from the best and what is alike."""
+        likely = (self.task.actions.to_unit(self.task.actions.likely(self.target)) + 1) / 2
+        known, alike = np.asarray(np.isfinite(likely).all(axis=0)), self._alike()
+        usual = np.where(known, likely, 0.0)
+        best, value = _best_first(*self._sample(usual, known, first))
+        for strains, generations, spread in _GENERATIONS:
+            found = evolve(
+                partial(self._perform_strains, strains),
+                best[:, :strains].reshape(-1, self.size),
+                spread * self.fine,
+                self._times(generations),
+                self.random,
+                self._advance,
+            )
+            best, value = _best_first(*(each.reshape(self.saccades, strains, *each.shape[1:]) for each in found))
+            if alike.shape[1]:
+                tried = np.clip((best[:, 0] - usual)[alike] + usual[:, None], 0, 1)
+                best, value = _merged(best, value, tried, self.judge(tried))
         return best[:, 0], value[:, 0]
 
     def go_on(self, x: Array, value: Array) -> tuple[Array, Array]:
@@ -179,15 +220,23 @@ class _Search:
         units = self.task.actions.from_unit(2 * actions - 1)
         return self.task.perform(self.start[rows], units, self.target[rows]).reward.total
 
-    def _sample(self, usual: Array, known: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Actions all over the box, but for numbers that are likely, and their values."""
+    def _perform_strains(self, strains: int, actions: Array, rows: NDArray[np.intp]) -> Array:
+        """Of several evolutions a saccade."""
+        return self._perform(actions, rows // strains)
+
+    def _sample(self, usual: Array, known: NDArray[np.bool_], first: ActionSpace) -> tuple[Array, Array]:
+        """Actions all over the box, but for numbers that are likely, and their values; half of them by `first`."""
         count = max(_ROUNDS[0].simplices, round(_SAMPLE * self.effort))
         shape = (self.saccades, count, self.size)
         cells = self.random.permuted(np.broadcast_to(np.arange(count)[:, None], shape), axis=1)
         x = (cells + self.random.random(shape)) / count
         near = usual[:, None] + _NEAR_LIKELY * self.fine * self.random.normal(size=shape)
-        x = np.where(known, np.clip(near, 0, 1), x)
-        return x, self.judge(x)
+        own = np.where(known, np.clip(near, 0, 1), x)
+        if first is not self.task.actions:
+            rows, half = np.repeat(np.arange(self.saccades), count // 2), x[:, : count // 2].reshape(-1, self.size)
+            told = first.as_plain(self.start[rows], self.target[rows], first.from_unit(2 * half - 1))
+            own[:, : count // 2] = (self.task.actions.to_unit(told).reshape(self.saccades, -1, self.size) + 1) / 2
+        return own, self.judge(own)
 
     def _basins(self, x: Array, value: Array, count: int) -> tuple[Array, Array]:
         """The best action, then each time the best on another side of a cliff (without one, elsewhere)."""
@@ -232,7 +281,7 @@ class _Search:
         points, values = climb(
             lambda x, which: self._perform(x, which // simplices),
             points.reshape(-1, corners, size),
-            self._iterations(each),
+            self._times(each.iterations),
             self._advance,
         )
         return points.reshape(saccades, simplices, corners, size), values.reshape(saccades, simplices, corners)

@@ -29,7 +29,7 @@ from orient_eye.state import State
 from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
-_SEARCH = "simplices 1"  # changes when the search does
+_SEARCH = "simplices 1, evolutions 2"  # changes when the search does
 _SEED = 20_210
 _STILL = 1e-4  # of |R|: as far as a reward may be from the one in a file that travelled
 
@@ -40,8 +40,8 @@ def cache_folder() -> Path:
 
 
 def task_key(task: SaccadeTask) -> str:
-    """Hash of plant, actions and reward: all that an optimum depends on but the saccades."""
-    return _hash({name: value for name, value in task.identity().items() if name != "targets"})
+    """Hash of plant, plain actions and reward: all that an optimum depends on but the saccades."""
+    return _hash({name: value for name, value in task.plain.identity().items() if name != "targets"})
 
 
 def searched_optimum(
@@ -63,7 +63,7 @@ def searched_optimum(
         folder: of the cache; None for `cache_folder()`.
         carried: a file that travels with a policy, where there is one: it is looked into first.
     """
-    taken = None if carried is None else carried_optimum(carried, task, start, target)
+    taken = None if carried is None else carried_optimum(carried, task.plain, start, target)
     if taken is not None:
         return taken
     key = {

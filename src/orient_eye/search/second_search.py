@@ -10,6 +10,7 @@ from orient_eye.state import State
 from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
+_NUMBERS = 3  # of the thesis' action
 AGREEMENT = 1e-3
 """Of |R*|: as far as the second search may be better before the first counts as wrong."""
 
@@ -18,8 +19,9 @@ def second_search(task: SaccadeTask, start: State, target: Array) -> tuple[Array
     """The best action (numbers,) of one saccade and its reward, by scipy's optimisers.
 
     Differential evolution, then Nelder and Mead's simplex around the best; once for either half of the range of
-    a number with a cliff (k0), since one alone may end on the wrong side of the overshoot. It shares with
-    `orient_eye.search.optimum` only the task, and knows nothing of where the optimum should be.
+    a number with a cliff (k0), since one alone may end on the wrong side of the overshoot; over the whole box, and
+    longer, where several have one. It shares with `orient_eye.search.optimum` only the task, and knows nothing of where
+    the optimum should be.
 
     Args:
         task: plant, command and reward.
@@ -36,10 +38,19 @@ def second_search(task: SaccadeTask, start: State, target: Array) -> tuple[Array
         return -task.perform(start[which], many, target[which]).reward.total
 
     found: list[tuple[float, Array]] = []
-    for half in ((0.0, 0.5), (0.5, 1.0)):
+    more = len(numbers) / _NUMBERS
+    for half in ((0.0, 0.5), (0.5, 1.0)) if cliff.sum() <= 1 else ((0.0, 1.0),):
         bounds = [half if steep else (0.0, 1.0) for steep in cliff]
         evolved = differential_evolution(
-            loss, bounds, vectorized=True, updating="deferred", rng=1, popsize=16, maxiter=120, tol=1e-6, polish=False
+            loss,
+            bounds,
+            vectorized=True,
+            updating="deferred",
+            rng=1,
+            popsize=16,
+            maxiter=round(120 * more),
+            tol=1e-6,
+            polish=False,
         )
         steps = np.diag([2e-3 if number.cliff else 0.4 * number.fine for number in numbers])
         found += [(float(evolved.fun), evolved.x), _polished(loss, evolved.x, bounds, steps, float(evolved.fun))]
@@ -61,7 +72,7 @@ def _polished(
             "initial_simplex": np.where(corners > highest, 2 * x - corners, corners),
             "xatol": 1e-7,
             "fatol": 1e-6 * abs(value),
-            "maxfev": 200,
+            "maxfev": round(200 * (len(x) / _NUMBERS) ** 2),
         },
     )
     return float(polished.fun), polished.x
