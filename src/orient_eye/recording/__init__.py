@@ -1,6 +1,7 @@
 """A batch of saccades as a Rerun recording (.rrd): the eye in 3-D beside its curves, without a screen.
 
     record("saccades.rrd", trajectory, target=rotations.from_yaw(yaw_deg))
+    record_sequence("sequence.rrd", trajectory, target=target)   # one after the other on one timeline
     $ orient-eye view saccades.rrd
 
 All saccades start at 0 on the one timeline `sim_time`; each is a branch of the entity tree and a tab of
@@ -9,7 +10,7 @@ sample (a constant has two). The durable record is the .npz: Rerun promises the 
 version only.
 
 Entities of a saccade, below /saccades/GROUP/INDEX_TITLE, in deg, deg/s, N and the motors' units:
-    angle/yaw, angle/pitch, angle/roll          orientation; pitch and roll where they move
+    angle/yaw, angle/pitch, angle/torsion       orientation; pitch and torsion where they move
     angle/target_yaw, ...                       of the target
     velocity/x, velocity/y, velocity/z          angular velocity, head frame; x and y where they move
     motor/NAME                                  motor positions
@@ -17,26 +18,36 @@ Entities of a saccade, below /saccades/GROUP/INDEX_TITLE, in deg, deg/s, N and t
     tension                                     of all tendons of the model
     reference/...                               angle, velocity and motor of the reference
     scene/BODY, scene/tendons, scene/target     3-D, metres, head frame
+    scene/trace, scene/start, scene/moment      way of the gaze ahead of the eye; where pitch or torsion move
+    scene/reference_trace                       of the reference
+    listing/path, listing/end, listing/moment   rotation vectors, 2 atan(r) [deg]; where torsion is shown
+
+A sequence (`record_sequence`) is one such branch, /sequence, that lasts through all its saccades; its targets are
+/sequence/scene/target/NUMBER.
 """
 
-import zlib
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from orient_eye import rotations
-from orient_eye.errors import InputError
 from orient_eye.eyes.model import ball
-from orient_eye.files import write_atomically
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.recording.curves import STILL_DEG, Curves
+from orient_eye.recording import titles as naming
+from orient_eye.recording.curves import Curves
 from orient_eye.recording.layout import SaccadeTab, blueprint, saccade_colours
 from orient_eye.recording.poses import pose, tendon_names
+from orient_eye.recording.rotation_vectors import RotationVectors
 from orient_eye.recording.scene import Scene, slug
+from orient_eye.recording.sequence import record_sequence as record_sequence
+from orient_eye.recording.stream import check, draw_info, write
+
+if TYPE_CHECKING:
+    import rerun as rr
 
 Array = NDArray[np.float64]
 
@@ -75,48 +86,17 @@ def record(
         InputError: lengths or names that do not fit the trajectory, or a path that is not NAME.rrd.
     """
     path = Path(path)
-    if path.suffix != ".rrd":
-        raise InputError(f"a recording is a file NAME.rrd, got {path.name!r}: write {path.stem}.rrd")
-    if not len(trajectory):
-        raise InputError("a recording needs at least one saccade, the trajectory has none")
-    if target is not None:
-        target = np.asarray(target, dtype=float)
-        if target.shape != (len(trajectory), 4):
-            raise InputError(
-                f"{len(trajectory)} saccades need targets of shape ({len(trajectory)}, 4), quaternions, got "
-                f"{target.shape}; rotations.from_yaw(yaw_deg) makes them"
-            )
-    for what, given in (("titles", titles), ("groups", groups), ("reference", reference)):
-        if given is not None and len(given) != len(trajectory):
-            raise InputError(f"{what}: one for each of the {len(trajectory)} saccades, got {len(given)}")
-    titles = _titles(trajectory, target) if titles is None else titles
+    target = None if target is None else np.asarray(target, dtype=float)
+    told: dict[str, Sized | None] = {"titles": titles, "groups": groups, "reference": reference}
+    check(path, len(trajectory), target, **told)
     content = _Content(
         trajectory=trajectory,
-        model=ball() if model is None else model,
-        tabs=_tabs(titles, groups),
+        tabs=_tabs(naming.titles(trajectory, target) if titles is None else titles, groups),
         target=target,
         reference=reference,
         notes=notes,
     )
-    return write_atomically(path, lambda file: _write(file, path.stem, content))
-
-
-def _titles(trajectory: Trajectory, target: Array | None) -> list[str]:
-    """Where each saccade goes, and whence if not from straight ahead; its number where there is no target."""
-    if target is None:
-        return [f"saccade {i}" for i in range(len(trajectory))]
-    start = np.nan_to_num(trajectory.orientation[:, 0])
-    pitch = any(abs(rotations.to_euler(q)[1]).max() > STILL_DEG for q in (start, target))
-    titles = [_direction(q, pitch) for q in target]
-    if rotations.angle_between(start, rotations.FORWARD)[~trajectory.failed].max(initial=0) > STILL_DEG:
-        titles = [f"{_direction(q, pitch)} → {title}" for q, title in zip(start, titles, strict=True)]
-    return titles
-
-
-def _direction(orientation: Array, pitch: bool, decimals: int = 1) -> str:
-    """Yaw, and pitch too, as text."""
-    angles = rotations.to_euler(orientation)[: 2 if pitch else 1]
-    return ", ".join(f"{angle:+.{decimals}f}".removesuffix(".0") + "°" for angle in angles)
+    return _write(path, content, ball() if model is None else model)
 
 
 def _tabs(titles: Sequence[str], groups: Sequence[str] | None) -> list[SaccadeTab]:
@@ -134,78 +114,74 @@ class _Content:
     """The arguments of `record`, checked and with their defaults."""
 
     trajectory: Trajectory
-    model: mujoco.MjModel
     tabs: list[SaccadeTab]
     target: Array | None
     reference: Trajectory | None
     notes: str
 
 
-def _write(file: Path, name: str, content: _Content) -> None:
-    import rerun as rr
-
+def _write(path: Path, content: _Content, model: mujoco.MjModel) -> Path:
     trajectory, target, reference = content.trajectory, content.target, content.reference
     shown = [tab for tab in content.tabs if not trajectory.failed[tab.index]]
     drawn = [tab.index for tab in shown]
-    poses = pose(content.model, trajectory)
-    tendons = tendon_names(content.model)
-    curves = Curves(trajectory, drawn, poses.tension, tendons, target=target, reference=reference)
-    span_deg = max(curves.largest_deg["yaw"], 30), curves.largest_deg["pitch"]
-    scene = Scene(content.model, poses, drawn, span_deg=span_deg)
+    poses = pose(model, trajectory)
+    curves = Curves(trajectory, drawn, poses.tension, tendon_names(model), target=target, reference=reference)
+    scene = Scene(model, poses, drawn, graticule=curves.graticule)
+    vectors = RotationVectors(trajectory.orientation[drawn]) if "torsion" in curves.turns else None
     plots, compared = curves.plots(), curves.compared()
-    # The viewer keeps what a person changed in the layout of an application: one application for each layout.
-    application = f"orient-eye-{zlib.crc32(repr((shown, plots, compared)).encode()):08x}"
-    strict = rr.strict_mode()
-    rr.set_strict_mode(True)
-    try:
-        with rr.RecordingStream(application) as rec:
-            stream = rr.binary_stream(rec)  # to memory: of a file on a full disk the SDK says nothing, or waits
-            rec.send_blueprint(blueprint(shown, plots, compared, scene), make_active=False)
-            rec.send_recording_name(name)
-            text = _info(content, pitch=curves.largest_deg["pitch"] > 0, tension_top=scene.tension_top)
-            rec.log("/info", rr.TextDocument(text, media_type="text/markdown"), static=True)
-            scene.draw_head(rec)
-            for tab in shown:
-                path, k = f"{tab.root}/scene", tab.index
-                scene.draw_saccade(rec, path, k, trajectory.time, colour=tab.colour)
-                if target is not None:
-                    scene.draw_target(rec, f"{path}/target", target[k], tab.colour)
-                if reference is not None and not reference.failed[k]:
-                    scene.draw_reference(rec, f"{path}/reference", reference.orientation[k], reference.time)
-                curves.draw(rec, tab.root, k, title=tab.title, colour=tab.colour)
-            rec.disconnect()  # writes the end, without which the recording is not whole
-            recording = stream.read()
-            if recording is None:
-                raise RuntimeError("the Rerun SDK returned no recording")
-            file.write_bytes(recording)
-    finally:
-        rr.set_strict_mode(strict)
+
+    def draw(rec: "rr.RecordingStream") -> None:
+        rec.send_blueprint(blueprint(shown, plots, compared, scene, vectors), make_active=False)
+        draw_info(rec, _info(content, curves, scene, vectors))
+        scene.draw_head(rec)
+        if vectors:
+            vectors.draw_axes(rec, "/listing")
+        for tab in shown:
+            root, k = f"{tab.root}/scene", tab.index
+            scene.draw_saccade(rec, root, k, trajectory.time, colour=tab.colour)
+            if target is not None:
+                scene.draw_target(rec, f"{root}/target", target[k], tab.colour)
+            if reference is not None and not reference.failed[k]:
+                scene.draw_reference(rec, f"{root}/reference", reference.orientation[k], reference.time)
+            if scene.graticule.around_deg:
+                scene.draw_trace(rec, root, trajectory.orientation[k], tab.colour)
+                scene.draw_moment(rec, root, trajectory.orientation[k], trajectory.time)
+            if vectors:
+                vectors.draw_path(rec, f"{tab.root}/listing", trajectory.orientation[k], trajectory.time, tab.colour)
+            curves.draw(rec, tab.root, k, title=tab.title, colour=tab.colour)
+
+    return write(path, (shown, plots, compared), draw)
 
 
-def _info(content: _Content, *, pitch: bool, tension_top: float) -> str:
+def _info(content: _Content, curves: Curves, scene: Scene, vectors: RotationVectors | None) -> str:
     """The text of the panel "info", Markdown."""
-    trajectory, target = content.trajectory, content.target
-    angles = "yaw, pitch" if pitch else "yaw"
-    scale = f"Tendons: green when slack, else from blue over magenta and orange to yellow at {tension_top:.3g} N."
-    tendons = [scale, ""] if content.model.ntendon else []
+    trajectory, target, angles = content.trajectory, content.target, ", ".join(curves.turns)
+    net = scene.graticule.around_deg
+    trace = (
+        " The line on the net of directions is the way of the gaze, the ring its start, the white dot where it is."
+        if net
+        else ""
+    )
     lines = [
         content.notes,
         "",
         "All saccades start at 0 on the timeline `sim_time`. Each has a tab; the time cursor stays when you change the "
         "tab. The line from the pupil is the line of sight, the dot ahead its target"
         + (", the grey line and the dark grey curves the reference. " if content.reference is not None else ". ")
-        + "Positive yaw is to the left, positive pitch down (head frame: x forward, y left, z up).",
+        + "Positive yaw is to the left, positive pitch down (head frame: x forward, y left, z up)."
+        + trace,
         "",
-        *tendons,
+        *scene.text,
+        *(vectors.text if vectors else []),
         f"| saccade | group | target {angles} | final {angles} | peak speed |",
         "|---|---|---|---|---|",
     ]
     for tab in content.tabs:
         k = tab.index
-        aim = "" if target is None else _direction(target[k], pitch, 2)
+        aim = "" if target is None else naming.attitude(target[k], curves.turns, 2)
         ended = "**failed: the simulation diverged, nothing is drawn** | "
         if not trajectory.failed[k]:
             peak = np.linalg.norm(trajectory.angular_velocity[k], axis=-1).max()
-            ended = f"{_direction(trajectory.orientation[k, -1], pitch, 2)} | {peak:.0f} °/s"
+            ended = f"{naming.attitude(trajectory.orientation[k, -1], curves.turns, 2)} | {peak:.0f} °/s"
         lines.append(f"| {tab.title} | {tab.group} | {aim} | {ended} |")
     return "\n".join(lines)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orient_eye import rotations
+from orient_eye import listing, rotations
 from orient_eye.movement.trajectory import Trajectory
+from orient_eye.recording.directions import Graticule, net, protractor
 from orient_eye.recording.scene import REFERENCE_COLOUR, TIMELINE, Colour, slug
 
 if TYPE_CHECKING:
@@ -21,9 +22,9 @@ TENDON_COLOURS: tuple[Colour, ...] = (
     (80, 160, 220), (255, 150, 60), (90, 190, 90), (235, 90, 90), (175, 130, 210),
     (170, 125, 110), (235, 140, 200), (200, 200, 70), (60, 200, 210), (150, 150, 150),
 )  # fmt: skip
-_TURNS = {"yaw": "z", "pitch": "y", "roll": "x"}  # an angle and the axis of its velocity
+_TURNS = {"yaw": "z", "pitch": "y", "torsion": "x"}  # an angle and the axis of its velocity
 STILL_DEG = 0.5
-"""Pitch and roll that stay below are left out."""
+"""Pitch and torsion that stay below are left out; torsion is shown, however small, where yaw and pitch both move."""
 _SAME = 1e-6  # of a motor's unit: a command that its motor follows to this is not drawn
 
 
@@ -35,14 +36,14 @@ class Plot:
         name: with its unit.
         series: entity paths below a saccade's root; those of the reference are added.
         span: smallest and largest value over all saccades, so that tabs compare.
-        legend: needed to tell the curves of one saccade apart.
+        legend: how many curves of one saccade it has to tell apart; 0 where there is one.
         shaded: the first curve is drawn in a shade of its saccade's colour, because of its place in a saccade's tab.
     """
 
     name: str
     series: tuple[str, ...]
     span: tuple[float, float]
-    legend: bool = False
+    legend: int = 0
     shaded: bool = False
 
 
@@ -54,15 +55,17 @@ class Curves:
         drawn: those that will be drawn.
         tension: of the tendons [N], (saccades, time, tendons).
         tendons: their names.
-        target: orientations (saccades, 4), or None.
+        target: orientations (saccades, 4), or (saccades, time, 4) where it changes, or None.
         reference: another trajectory of the same saccades, or None.
 
     Attributes:
         own: entity path below a saccade's root to values (saccades, time).
         told: the same of commands, where a motor was told to be elsewhere than it was.
-        target: the same of the target, (saccades,).
+        target: the same of the target, (saccades,) or (saccades, time).
         reference: the same of the reference, (saccades, its time); its root is the saccade's "reference".
-        largest_deg: largest yaw, pitch and roll either way; 0 for those left out.
+        turns: the angles that are shown, of yaw, pitch, torsion.
+        largest_deg: the largest of each either way; 0 for those left out.
+        eccentricity_deg: how far the gaze, or its target, is from straight ahead at most.
     """
 
     def __init__(
@@ -79,9 +82,14 @@ class Curves:
         orientations = [trajectory.orientation[drawn]]
         orientations += [] if target is None else [target[drawn]]
         orientations += [] if reference is None else [np.nan_to_num(reference.orientation[drawn])]
-        angles = [_angles(q) for q in orientations]
-        largest = {turn: max(float(abs(each[turn]).max(initial=0)) for each in angles) for turn in _TURNS}
-        turns = [turn for turn in _TURNS if turn == "yaw" or largest[turn] > STILL_DEG]
+        turned = [turned_by(q) for q in orientations]
+        largest = {turn: max(float(abs(each[turn]).max(initial=0)) for each in turned) for turn in _TURNS}
+        moving = {turn for turn in _TURNS if largest[turn] > STILL_DEG}
+        shown = moving | {"yaw"} | ({"torsion"} if {"yaw", "pitch"} <= moving else set())
+        self.turns = turns = [turn for turn in _TURNS if turn in shown]
+        ahead = rotations.gaze(rotations.FORWARD)
+        away = [rotations.angle_between_directions(rotations.gaze(q), ahead) for q in orientations]
+        self.eccentricity_deg = max(float(each.max(initial=0)) for each in away)
         self.largest_deg = {turn: largest[turn] if turn in turns else 0.0 for turn in _TURNS}
         self.own = _curves(trajectory, turns)
         self._units = {f"motor/{slug(motor.name)}": motor.unit for motor in trajectory.motors}
@@ -91,23 +99,32 @@ class Curves:
             for i, motor in enumerate(trajectory.motors)
             if off[i]
         }
-        self.target = {} if target is None else {f"angle/target_{turn}": _angles(target)[turn] for turn in turns}
+        self.target = {} if target is None else {f"angle/target_{turn}": turned_by(target)[turn] for turn in turns}
         self.reference = {} if reference is None else _curves(reference, turns)
         self._reference_time = np.zeros(0) if reference is None else reference.time
         self._reference_failed = np.zeros(0, bool) if reference is None else reference.failed
 
+    @property
+    def graticule(self) -> Graticule:
+        """By which the gaze is read: a protractor where only yaw moves, else a net of directions."""
+        if len(self.turns) > 1:
+            return net(self.eccentricity_deg)
+        return protractor(max(self.largest_deg["yaw"], 30))
+
     def plots(self) -> list[Plot]:
-        """Those beside the eye: angles with their targets, motors by unit with their commands, velocity, tension."""
-        angles, moving = self._named("angle"), self._moving_motors()
+        """Beside the eye: angles with targets (torsion apart), motors by unit with commands, velocity, tension."""
+        moving = self._moving_motors()
         units = dict.fromkeys(self._units[name] for name in moving)
+        angles = [f"angle/{turn}" for turn in self.turns]
+        gaze, torsion = ([a for a in angles if (a == "angle/torsion") == apart] for apart in (False, True))
         plots = [
-            self._plot(self._angle_name(*angles), [*angles, *self.target]),
+            *(self._angle_plot(shown) for shown in (gaze, torsion) if shown),
             *(self._motor_plot([name for name in moving if self._units[name] == unit]) for unit in units),
             self._plot("angular velocity [deg/s]", self._named("velocity")),
         ]
         if self._tendons:
             top = float(self._tension[self._drawn].max(initial=0))
-            plots.append(Plot("tension [N]", ("tension",), (0, top), legend=True))
+            plots.append(Plot("tension [N]", ("tension",), (0, top), legend=len(self._tendons)))
         return plots
 
     def compared(self) -> list[Plot]:
@@ -117,9 +134,7 @@ class Curves:
             for place, curve in enumerate(name for name in plot.series if name in self.own):
                 quantity, what = curve.split("/")
                 if quantity == "angle":
-                    goal = f"angle/target_{what}"
-                    series = [curve, *([goal] if goal in self.target else [])]
-                    each = self._plot(self._angle_name(curve), series)
+                    each = self._angle_plot([curve])
                 elif quantity == "motor":
                     each = self._motor_plot([curve])
                 else:
@@ -138,7 +153,7 @@ class Curves:
             _send(rec, f"{root}/{path}", self._time, values[saccade], style)
         for path, angle in self.target.items():
             style = _style(f"{path.split('/')[1].replace('_', ' ')} {title}", TARGET_COLOUR, 1)
-            _send(rec, f"{root}/{path}", self._time, np.full_like(self._time, angle[saccade]), style)
+            _send(rec, f"{root}/{path}", self._time, np.broadcast_to(angle[saccade], self._time.shape), style)
         if self.reference and not self._reference_failed[saccade]:
             for path, values in self.reference.items():
                 style = _style(f"reference {path.split('/')[1]} {title}", REFERENCE_COLOUR, 1)
@@ -161,9 +176,11 @@ class Curves:
         ]
         return moving or motors
 
-    def _angle_name(self, *curves: str) -> str:
-        angles = ", ".join(curve.removeprefix("angle/") for curve in curves)
-        return f"{angles} [deg]" + (", target grey" if self.target else "")
+    def _angle_plot(self, angles: Sequence[str]) -> Plot:
+        """Of angles with their targets."""
+        turns = [angle.removeprefix("angle/") for angle in angles]
+        goals = [goal for goal in (f"angle/target_{turn}" for turn in turns) if goal in self.target]
+        return self._plot(f"{', '.join(turns)} [deg]" + (", target grey" if goals else ""), [*angles, *goals])
 
     def _motor_plot(self, motors: Sequence[str]) -> Plot:
         """Of motors of one unit."""
@@ -175,7 +192,8 @@ class Curves:
         sources = (self.own, self.told, self.target, self.reference)
         values = [np.nan_to_num(curves[each][self._drawn]) for curves in sources for each in series if each in curves]
         span = float(min(v.min(initial=0) for v in values)), float(max(v.max(initial=0) for v in values))
-        return Plot(name, tuple(series), span, legend=sum(each in self.own for each in series) > 1)
+        several = sum(each in self.own for each in series) > 1
+        return Plot(name, tuple(series), span, legend=len(series) if several else 0)
 
 
 def shade(colour: Colour, place: int) -> Colour:
@@ -190,19 +208,21 @@ def _command_of(motor: str) -> str:
     return "command/" + motor.removeprefix("motor/")
 
 
-def _angles(orientation: Array) -> dict[str, Array]:
-    return dict(zip(("yaw", "pitch", "roll"), rotations.to_euler(orientation), strict=True))
+def turned_by(orientation: Array) -> dict[str, Array]:
+    """Yaw, pitch and torsion [deg], each (...), of orientations (..., 4), by name."""
+    yaw, pitch, _ = rotations.to_euler(orientation)
+    return {"yaw": yaw, "pitch": pitch, "torsion": listing.torsion(orientation)}
 
 
 def _curves(trajectory: Trajectory, turns: Sequence[str]) -> dict[str, Array]:
-    angles = _angles(trajectory.orientation)
-    curves = {f"angle/{turn}": angles[turn] for turn in turns}
+    turned = turned_by(trajectory.orientation)
+    curves = {f"angle/{turn}": turned[turn] for turn in turns}
     curves |= {f"velocity/{_TURNS[t]}": trajectory.angular_velocity[..., "xyz".index(_TURNS[t])] for t in turns}
     return curves | {f"motor/{slug(name)}": trajectory.motor[..., i] for i, name in enumerate(trajectory.motor_names)}
 
 
 def _style(name: str, colour: Colour, width: float) -> dict[str, Any]:
-    return {"names": [name], "colors": [colour], "widths": [width]}
+    return {"names": [name.strip()], "colors": [colour], "widths": [width]}
 
 
 def _send(rec: "rr.RecordingStream", path: str, time: Array, values: Array, style: dict[str, Any]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.recording.curves import Plot
+from orient_eye.recording.rotation_vectors import RotationVectors
 from orient_eye.recording.scene import TIMELINE, Colour, Scene
 
 Array = NDArray[np.float64]
@@ -19,7 +20,7 @@ SACCADE_COLOURS = np.array(
     [[90, 140, 255], [50, 200, 220], [90, 210, 110], [235, 215, 70], [250, 150, 60], [240, 80, 90], [220, 100, 210]]
 )
 """Colours of saccades, by title; more than seven are mixed from them."""
-_PLAYBACK_SPEED = 0.1  # a saccade lasts some tenths of a second
+_SPEED, _SEQUENCE_SPEED = 0.1, 0.4  # of playing: a saccade lasts some tenths of a second
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,13 @@ def saccade_colours(titles: Sequence[str]) -> list[Colour]:
     return [colours[title] for title in titles]
 
 
-def blueprint(saccades: Sequence[SaccadeTab], plots: Sequence[Plot], compared: Sequence[Plot], scene: Scene) -> Any:
+def blueprint(
+    saccades: Sequence[SaccadeTab],
+    plots: Sequence[Plot],
+    compared: Sequence[Plot],
+    scene: Scene,
+    vectors: RotationVectors | None = None,
+) -> Any:
     """The viewer's layout.
 
     Args:
@@ -59,37 +66,21 @@ def blueprint(saccades: Sequence[SaccadeTab], plots: Sequence[Plot], compared: S
         plots: of each saccade's tab.
         compared: of the first tab, all saccades in each.
         scene: what is drawn in 3-D.
+        vectors: what is drawn of rotation vectors, or None.
     """
-    import rerun as rr
     import rerun.blueprint as rrb
 
-    def view(name: str, contents: list[str]) -> rrb.Spatial3DView:
-        return rrb.Spatial3DView(
-            origin="/",
-            contents=["/head/**", *contents],
-            name=name,
-            line_grid=False,
-            eye_controls=rrb.EyeControls3D(position=scene.camera, look_target=scene.middle, eye_up=[0, 0, 1]),
-        )
+    def listing(shown: Sequence[SaccadeTab]) -> list[Any]:
+        return [_vectors_view(vectors, [f"{s.root}/listing/**" for s in shown])] if vectors else []
 
-    def plot(which: Plot, shown: Sequence[SaccadeTab], name: str = "") -> rrb.TimeSeriesView:
-        low, high = which.span
-        margin = 0.05 * max(high - low, 1e-3)
-        recoloured: Any = {f"{s.root}/{which.series[0]}": rr.SeriesLines(colors=[s.colour]) for s in shown}
-        return rrb.TimeSeriesView(
-            origin="/" if len(shown) > 1 else shown[0].root,
-            contents=[f"{s.root}/{part}{path}" for s in shown for path in which.series for part in ("", "reference/")],
-            name=name or which.name,
-            axis_y=rrb.ScalarAxis(range=(low - margin, high + margin)),
-            plot_legend=rrb.PlotLegend("righttop", visible=which.legend and len(shown) == 1),
-            overrides=recoloured if which.shaded else None,
-        )
+    def gaze(shown: Sequence[SaccadeTab]) -> list[Any]:
+        return [_gaze_view(scene, [f"{s.root}/scene" for s in shown])] if scene.graticule.around_deg else []
 
     def tab(saccade: SaccadeTab) -> rrb.Horizontal:
+        beside = [_plot(p, [saccade]) for p in plots] + listing([saccade])
+        eye = _eye_view(scene, "eye", [f"{saccade.root}/scene/**"])
         return rrb.Horizontal(
-            view("eye", [f"{saccade.root}/scene/**"]),
-            rrb.Grid(*(plot(p, [saccade]) for p in plots), grid_columns=2),
-            name=saccade.title,
+            rrb.Vertical(eye, *gaze([saccade])), rrb.Grid(*beside, grid_columns=2), name=saccade.title
         )
 
     groups: dict[str, list[SaccadeTab]] = {}
@@ -98,28 +89,126 @@ def blueprint(saccades: Sequence[SaccadeTab], plots: Sequence[Plot], compared: S
     info = rrb.TextDocumentView(origin="/info", name="info")
     tabs: list[Any] = []
     if len(saccades) > 1:
-        lines = [f"{s.root}/{part}" for s in saccades for part in (f"scene/{scene.gaze}", "scene/target")]
-        fan = view(f"eye of {saccades[0].title}, lines of sight of all", [f"{saccades[0].root}/scene/**", *lines])
-        beside = [plot(p, saccades) for p in compared]
+        lines = [line for s in saccades for line in _lines(f"{s.root}/scene", scene.gaze)]
+        name = f"eye of {saccades[0].title}, lines of sight of all"
+        fan = _eye_view(scene, name, [f"{saccades[0].root}/scene/**", *lines])
+        beside = [_plot(p, saccades) for p in compared]
         if len(beside) < 4:
             first = rrb.Horizontal(fan, rrb.Grid(*beside, info, grid_columns=2), name="all saccades")
         else:
             grid = rrb.Grid(*beside, grid_columns=3)
-            first = rrb.Horizontal(rrb.Vertical(fan, info), grid, column_shares=[2, 3], name="all saccades")
+            views = [*gaze(saccades), *listing(saccades)] or [info]
+            first = rrb.Horizontal(rrb.Vertical(fan, *views), grid, column_shares=[2, 3], name="all saccades")
         tabs.append(first)
     if len(groups) > 1:
-        each = [plot(compared[0], members, f"{group}: {compared[0].name}") for group, members in groups.items()]
+        each = [_plot(compared[0], members, f"{group}: {compared[0].name}") for group, members in groups.items()]
         tabs.append(rrb.Grid(*each, name="by group"))
         tabs += [rrb.Tabs(*(tab(s) for s in members), name=group) for group, members in groups.items()]
     else:
         tabs += [tab(s) for s in saccades]
-    if len(saccades) < 2:
+    if len(saccades) < 2 or scene.graticule.around_deg:
         tabs.append(info)
+    return _whole(tabs, _SPEED)
+
+
+def sequence_blueprint(
+    sequence: SaccadeTab, plots: Sequence[Plot], scene: Scene, vectors: RotationVectors | None, *, lasts_s: float
+) -> Any:
+    """The viewer's layout of saccades one after the other.
+
+    Args:
+        sequence: all of them, as one.
+        plots: its curves.
+        scene: what is drawn in 3-D.
+        vectors: what is drawn of rotation vectors, or None.
+        lasts_s: how long it lasts [s]; the curves leave room beyond for their legends.
+    """
+    import rerun.blueprint as rrb
+
+    root, trace = sequence.root, [f"{sequence.root}/scene/trace"]
+    eye = _eye_view(scene, "eye", [f"{root}/scene/**"], growing=trace)
+    views = [_gaze_view(scene, [f"{root}/scene"], growing=trace)] if scene.graticule.around_deg else []
+    if vectors:
+        growing = [f"{root}/listing/path", f"{root}/listing/ends"]
+        views.append(_vectors_view(vectors, [f"{root}/listing/**"], growing=growing))
+    left = rrb.Vertical(eye, rrb.Horizontal(*views)) if views else eye
+    shares = [max(5, 2 + 1.3 * p.legend) for p in plots]  # so that legends have room
+    curves = rrb.Vertical(*(_plot(p, [sequence], until_s=1.15 * lasts_s) for p in plots), row_shares=shares)
+    shown = rrb.Horizontal(left, curves, name=sequence.title)
+    return _whole([shown, rrb.TextDocumentView(origin="/info", name="info")], _SEQUENCE_SPEED)
+
+
+def _eye_view(scene: Scene, name: str, contents: list[str], growing: Sequence[str] = ()) -> Any:
+    return _view(name, ["/head/**", *contents], scene.camera, scene.middle, growing)
+
+
+def _gaze_view(scene: Scene, roots: Sequence[str], growing: Sequence[str] = ()) -> Any:
+    """The lines ahead of the eye as it sees them: left is left, up is up."""
+    lines = [line for root in roots for line in _lines(root, "moment", "reference_trace")]
+    contents = [f"/head/{scene.graticule.name}/**", *lines]
+    return _view("gaze, from behind the eye", contents, scene.behind, scene.ahead, growing)
+
+
+def _lines(root: str, *parts: str) -> list[str]:
+    """What tells where a saccade looks."""
+    return [f"{root}/{part}" for part in (*parts, "target/**", "trace", "start")]
+
+
+def _vectors_view(vectors: RotationVectors, contents: list[str], growing: Sequence[str] = ()) -> Any:
+    return _view(vectors.name, ["/listing/**", *contents], vectors.camera, np.zeros(3), growing)
+
+
+def _view(name: str, contents: list[str], camera: Array, middle: Array, growing: Sequence[str]) -> Any:
+    """Of something in 3-D; what grows is shown from the beginning up to the moment."""
+    import rerun.blueprint as rrb
+
+    until_now = rrb.VisibleTimeRanges(
+        timeline=TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
+    )
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=contents,
+        name=name,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(position=camera, look_target=middle, eye_up=[0, 0, 1]),
+        overrides=dict.fromkeys(growing, until_now),
+    )
+
+
+def _plot(which: Plot, shown: Sequence[SaccadeTab], name: str = "", until_s: float | None = None) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    low, high = which.span
+    margin = 0.05 * max(high - low, 1e-3)
+    recoloured: Any = {f"{s.root}/{which.series[0]}": rr.SeriesLines(colors=[s.colour]) for s in shown}
+    return rrb.TimeSeriesView(
+        origin="/" if len(shown) > 1 else shown[0].root,
+        contents=[f"{s.root}/{part}{path}" for s in shown for path in which.series for part in ("", "reference/")],
+        name=name or which.name,
+        axis_x=None if until_s is None else rrb.TimeAxis(view_range=_from_the_beginning(until_s)),
+        axis_y=rrb.ScalarAxis(range=(low - margin, high + margin)),
+        plot_legend=rrb.PlotLegend("righttop", visible=which.legend > 0 and len(shown) == 1),
+        overrides=recoloured if which.shaded else None,
+    )
+
+
+def _from_the_beginning(until_s: float) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    begin, end = (rrb.TimeRangeBoundary.absolute(seconds=seconds) for seconds in (0.0, until_s))
+    return rr.TimeRange(start=begin, end=end)
+
+
+def _whole(tabs: Sequence[Any], speed: float) -> Any:
+    import rerun.blueprint as rrb
+
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, playback_speed=_PLAYBACK_SPEED, loop_mode="all"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, playback_speed=speed, loop_mode="all"),
         auto_views=False,
         auto_layout=False,
     )

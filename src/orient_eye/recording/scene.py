@@ -7,16 +7,17 @@ Nothing here knows how many motors, tendons or bodies there are: another eye dra
 """
 
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
+from orient_eye import rotations
+from orient_eye.recording.directions import Graticule, ring
 from orient_eye.recording.geometry import geometry
 from orient_eye.recording.poses import Poses
-from orient_eye.rotations import rotation
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -29,8 +30,11 @@ SLACK_COLOUR = (70, 205, 130)
 TENSION_COLOURS = ((60, 110, 250), (190, 70, 210), (255, 110, 70), (255, 235, 90))
 """Of a tendon that pulls, from just taut to the top of the scale, straight lines between."""
 REFERENCE_COLOUR = (120, 120, 128)
-_PROTRACTOR_COLOUR = (150, 150, 155)
+MOMENT_COLOUR = (255, 255, 255)
+"""Of a dot that stands where the eye is at the moment."""
+_GRATICULE_COLOUR = (150, 150, 155)
 _ROWS = 500  # of a chunk of line strips: `rerun rrd verify` takes time by its square
+_DOT, _TRACE = 0.024, 0.004  # radii of a target and of the gaze's trace, of the line of sight's length
 _REACH = 4.5  # the line of sight is this many eye radii long
 _CAMERA = np.array([0.62, 0.67, 0.41])  # ahead, to the left and above: iris and arms are seen
 
@@ -57,19 +61,18 @@ class Scene:
         model: the compiled eye.
         poses: of the batch.
         drawn: the saccades that will be drawn.
-        span_deg: how far the protractor ahead of the eye reaches, horizontally and vertically [deg].
+        graticule: the lines ahead of the eye by which its gaze is read.
 
     Attributes:
         reach: length of the line of sight, from the centre of the eye [m].
         gaze: entity path of the line of sight below a saccade's.
         tension_top: of the colour scale [N].
         camera, middle: where to look from and to [m], head coordinates.
+        behind, ahead: the same, to see the whole net as the eye itself does.
     """
 
-    def __init__(
-        self, model: mujoco.MjModel, poses: Poses, drawn: list[int], *, span_deg: tuple[float, float] = (30, 0)
-    ) -> None:
-        self.model, self.poses, self.span_deg = model, poses, span_deg
+    def __init__(self, model: mujoco.MjModel, poses: Poses, drawn: list[int], *, graticule: Graticule) -> None:
+        self.model, self.poses, self.graticule = model, poses, graticule
         sites = [model.site(i).name for i in range(model.nsite)]
         self._shapes = [geometry(model, body) for body in range(model.nbody)]
         self.gaze_start = model.site("gaze").pos.copy() if "gaze" in sites else np.zeros(3)
@@ -84,7 +87,20 @@ class Scene:
         strongest = float(poses.tension[drawn].max(initial=0))
         self.tension_top = float(np.ceil(strongest)) if strongest > 1 else max(strongest, 1e-3)
         self.middle = self._still[eye, :3] + 0.2 * (model.stat.center - self._still[eye, :3])
-        self.camera = self.middle + (model.stat.extent + 0.7 * self.reach) * _CAMERA
+        away, around = model.stat.extent + 0.7 * self.reach, np.deg2rad(graticule.around_deg)
+        if around:  # the net reaches further ahead, and the view shares its place with that of the gaze
+            self.middle = self.middle + 0.15 * self.reach * np.eye(3)[0]
+            away = max(0.85 * away, 3.6 * np.sin(around) * self.reach)
+        self.camera = self.middle + away * _CAMERA
+        self.behind, self.ahead = self.reach * np.array([[np.cos(around) - 2.8 * np.sin(around), 0, 0], [1, 0, 0]])
+
+    @property
+    def text(self) -> list[str]:
+        """What the colours say, lines of Markdown."""
+        scale = (
+            f"Tendons: green when slack, else from blue over magenta and orange to yellow at {self.tension_top:.3g} N."
+        )
+        return [scale, ""] if self.model.ntendon else []
 
     def _name(self, body: int) -> str:
         return slug(self.model.body(body).name) or f"body{body}"
@@ -99,11 +115,13 @@ class Scene:
             if self._draw_body(rec, path, body):
                 turned = np.roll(stands[3:], -1)
                 rec.log(path, rr.Transform3D(translation=stands[:3], quaternion=turned), static=True)
-        strips, marks, labels = _protractor(self.reach, *self.span_deg)
-        thin = 0.0015 * self.reach
-        rec.log("/head/protractor", rr.LineStrips3D(strips, colors=_PROTRACTOR_COLOUR, radii=thin), static=True)
-        labelled = rr.Points3D(marks, labels=labels, show_labels=True, radii=thin, colors=_PROTRACTOR_COLOUR)
-        rec.log("/head/protractor/degrees", labelled, static=True)
+        lines, thin, path = self.graticule, 0.0015 * self.reach, f"/head/{self.graticule.name}"
+        strips = [self.reach * strip for strip in lines.strips]
+        rec.log(path, rr.LineStrips3D(strips, colors=_GRATICULE_COLOUR, radii=thin), static=True)
+        marks = rr.Points3D(
+            self.reach * lines.marks, labels=lines.labels, show_labels=True, radii=thin, colors=_GRATICULE_COLOUR
+        )
+        rec.log(f"{path}/degrees", marks, static=True)
 
     def draw_saccade(self, rec: "rr.RecordingStream", path: str, saccade: int, time: Array, *, colour: Colour) -> None:
         """Moving bodies, tendons and the line of sight of a saccade, (time,) [s], below an entity path."""
@@ -119,19 +137,64 @@ class Scene:
         self._draw_tendons(rec, f"{path}/tendons", saccade, time)
 
     def draw_reference(self, rec: "rr.RecordingStream", path: str, orientation: Array, time: Array) -> None:
-        """The line of sight of another trajectory in grey; orientation (time, 4), time (time,) [s]."""
+        """The line of sight of another trajectory in grey, and its way; orientation (time, 4), time (time,) [s]."""
         import rerun as rr
 
         turned = rr.Transform3D.columns(quaternion=np.roll(orientation, -1, axis=-1))
         rec.send_columns(path, [rr.TimeColumn(TIMELINE, duration=time)], turned)
         self._draw_gaze(rec, f"{path}/gaze", REFERENCE_COLOUR)
+        if self.graticule.around_deg:
+            rec.log(f"{path}_trace", self._trace(orientation, REFERENCE_COLOUR), static=True)
 
     def draw_target(self, rec: "rr.RecordingStream", path: str, orientation: Array, colour: Colour) -> None:
         """A point where the line of sight of an orientation (4,) ends."""
         import rerun as rr
 
-        point = rotation(orientation).apply([self.reach, 0, 0])
-        rec.log(path, rr.Points3D([point], radii=0.024 * self.reach, colors=[colour]), static=True)
+        point = self.reach * rotations.gaze(orientation)
+        rec.log(path, rr.Points3D([point], radii=_DOT * self.reach, colors=[colour]), static=True)
+
+    def draw_targets(
+        self, rec: "rr.RecordingStream", path: str, orientation: Array, since: Array, colours: Sequence[Colour]
+    ) -> None:
+        """Numbered targets (saccades, 4), each from its moment [s] on; smaller once it is no more the one."""
+        import rerun as rr
+
+        for i, (point, colour) in enumerate(zip(self.reach * rotations.gaze(orientation), colours, strict=True)):
+            when, radii = since[i : i + 2], np.array([1.0, 0.5])[: since.size - i] * _DOT * self.reach
+            style = rr.Points3D.from_fields(colors=[colour], labels=[f"{i + 1}"], show_labels=True)
+            rec.log(f"{path}/{i + 1}", style, static=True)
+            dots = rr.Points3D.columns(positions=np.repeat(point[None], when.size, axis=0), radii=radii)
+            rec.send_columns(f"{path}/{i + 1}", [rr.TimeColumn(TIMELINE, duration=when)], dots)
+
+    def draw_moment(self, rec: "rr.RecordingStream", path: str, orientation: Array, time: Array) -> None:
+        """A dot where the line of sight ends, orientation (time, 4) at times [s]."""
+        import rerun as rr
+
+        style = rr.Points3D.from_fields(colors=[MOMENT_COLOUR], radii=[0.5 * _DOT * self.reach])
+        rec.log(f"{path}/moment", style, static=True)
+        dots = rr.Points3D.columns(positions=self.reach * rotations.gaze(orientation))
+        rec.send_columns(f"{path}/moment", [rr.TimeColumn(TIMELINE, duration=time)], dots)
+
+    def draw_trace(self, rec: "rr.RecordingStream", path: str, orientation: Array, colour: Colour) -> None:
+        """The way of the line of sight's end, orientation (time, 4), and a ring where it starts."""
+        import rerun as rr
+
+        rec.log(f"{path}/trace", self._trace(orientation, colour), static=True)
+        start = self.reach * ring(orientation[0])
+        thin = 0.6 * _TRACE * self.reach
+        rec.log(f"{path}/start", rr.LineStrips3D([start], colors=[colour], radii=thin), static=True)
+
+    def _trace(self, orientation: Array, colour: Colour) -> "rr.LineStrips3D":
+        import rerun as rr
+
+        trace = self.reach * rotations.gaze(orientation)
+        return rr.LineStrips3D([trace], colors=[colour], radii=_TRACE * self.reach)
+
+    def grow_trace(
+        self, rec: "rr.RecordingStream", path: str, orientation: Array, time: Array, colours: NDArray[np.uint8]
+    ) -> None:
+        """The same trace as one that grows with time [s], in colours (time, 3)."""
+        grow(rec, f"{path}/trace", self.reach * rotations.gaze(orientation), time, colours, radii=_TRACE * self.reach)
 
     def _draw_tendons(self, rec: "rr.RecordingStream", path: str, saccade: int, time: Array) -> None:
         import rerun as rr
@@ -164,21 +227,18 @@ class Scene:
         )
 
 
-def _protractor(reach: float, horizontal: float, vertical: float) -> tuple[list[Array], Array, list[str]]:
-    """Arcs with a tick every 10 deg at a distance [m] ahead: line strips, places of labels (n, 3), labels."""
-    strips: list[Array] = []
-    marks: list[Array] = []
-    labels: list[str] = []
-    for span, axis in ((horizontal, 2), (vertical, 1)):
-        if span == 0:
-            continue
-        last = 10 * int(np.ceil(span / 10))
-        degrees = np.arange(-last, last + 1)
-        arc = Rotation.from_rotvec(np.eye(3)[axis] * degrees[:, None], degrees=True).apply([reach, 0, 0])
-        ticks = np.flatnonzero(degrees % 10 == 0)
-        strips += [arc, *(np.outer([0.985, 1.015], arc[tick]) for tick in ticks)]
-        written = [tick for tick in ticks if degrees[tick] % (10 if last <= 60 else 30) == 0]
-        written = [tick for tick in written if degrees[tick] or axis == 2]  # one 0 is enough
-        marks += [1.05 * arc[tick] for tick in written]
-        labels += [f"{degrees[tick]}°" for tick in written]
-    return strips, np.array(marks), labels
+def grow(
+    rec: "rr.RecordingStream", path: str, points: Array, time: Array, colours: NDArray[np.uint8], *, radii: ArrayLike
+) -> None:
+    """A line through points (time, 3) in colours (time, 3), each sample's piece a row at its time [s].
+
+    It grows in a view of all rows up to the moment. Where nothing moved there is no row.
+    """
+    import rerun as rr
+
+    rec.log(path, rr.LineStrips3D.from_fields(radii=radii), static=True)
+    pieces = np.stack([points[:-1], points[1:]], axis=1)
+    moved = np.flatnonzero((pieces[:, 0] != pieces[:, 1]).any(axis=1))
+    for rows in np.split(moved, range(_ROWS, moved.size, _ROWS)):
+        columns = rr.LineStrips3D.columns(strips=list(pieces[rows]), colors=colours[rows + 1])
+        rec.send_columns(path, [rr.TimeColumn(TIMELINE, duration=time[rows + 1])], columns)
