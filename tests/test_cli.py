@@ -123,7 +123,7 @@ def test_what_is_registered_is_offered(
     page = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert ",toy}" in page
     assert "--springs INT Number of springs. For toy; default 6." in page
-    assert "For mujoco, tavares; default thesis. Which eye. For toy; default left." in page
+    assert "For mujoco, tavares, viscous; default thesis. Which eye. For toy; default left." in page
     assert "--wet In water. For toy." in page
     choices = {"train": ("case", "targets"), "optimum": ("case", "targets", "pulse")}
     choices["weights"] = choices["optimum"]

@@ -10,12 +10,12 @@ import orient_eye
 SOURCE = Path(orient_eye.__file__).parent
 FLOORS = [
     ["errors", "constants", "words", "registry", "resources"],
-    ["files", "tables", "rotations", "motor", "state", "progress", "run_directory", "rig"],
+    ["files", "tables", "rotations", "listing", "motor", "state", "progress", "run_directory", "rig"],
     ["commands"],
     ["movement"],
-    ["eyes", "surrogate"],
+    ["eyes", "surrogate", "modal_surrogate"],
     ["plants"],
-    ["task"],
+    ["task", "statics"],
     ["search"],
     ["recording"],
     ["environments"],

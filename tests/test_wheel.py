@@ -21,6 +21,7 @@ SHIPPED = {
     "models/rigs/prototype.toml",
     "models/surrogates/thesis.json",
     "models/surrogates/mujoco.json",
+    "models/surrogates_3d/thesis-3d.json",
     "models/human/main_sequence.csv",
     "models/author_simulator/trajectories.npz",
 }
@@ -42,6 +43,7 @@ assert oe.build_model().nmesh > 0
 Rig.load("prototype")
 for name in ("thesis", "mujoco"):
     assert oe.Surrogate.load(name).w0 > 0
+assert oe.ModalSurrogate.load("thesis-3d").modes["yaw"].w0 > 0
 policies = sorted(folder.name for folder in data_folder("models").glob("policies/*"))
 assert len(policies) > 1
 for name in policies:

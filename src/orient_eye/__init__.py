@@ -18,12 +18,13 @@ quaternions w, x, y, z from eye to head coordinates. `InputError` says what was 
 | a plant | `make_plant`, `PLANTS`, `Plant`, `Motor`, `State` |
 | a command | `PulseStep`, `Sampled`, `read_command`, `PULSES` |
 | a movement | `Movement`, `Trajectory`, `Measures`, `measure` |
+| a direction of gaze | `Fixations`, `torsion`, `with_torsion`, `fit_plane` (docs/gaze.md) |
 | a saccade | `SaccadeTask`, `Outcome`, `saccades`, `make_targets`, `TARGETS`, `CASES`, `Case`, `JUDGES` |
 | the best action | `find_optimum`, `searched_optimum`, `solve_weights` |
 | an environment | `gymnasium.make("OrientEye/Saccade-v0")`, `SaccadeEnv`, `SaccadeVectorEnv`; `SaccadeVecEnv` for SB3 |
 | a policy | `Policy`, `train`, `TrainConfig` |
-| a rig | `identify_plant`, `identify_recordings`, `read_recordings`, `Surrogate` |
-| a picture | `record` (Rerun), `frames`, `write_film` |
+| a rig | `identify_plant`, `identify_recordings`, `read_recordings`, `Surrogate`; `identify_modes`, `ModalSurrogate` |
+| a picture | `record`, `record_sequence` (Rerun), `frames`, `write_film` |
 
 Names are loaded when they are first used: importing orient_eye loads neither NumPy, MuJoCo nor torch.
 """

@@ -13,6 +13,16 @@ from .eyes.model import build_model as build_model
 from .learning.config import TrainConfig as TrainConfig
 from .learning.policy import Policy as Policy
 from .learning.training import train as train
+from .listing import (
+    fit_plane as fit_plane,
+)
+from .listing import (
+    torsion as torsion,
+)
+from .listing import (
+    with_torsion as with_torsion,
+)
+from .modal_surrogate import ModalSurrogate as ModalSurrogate
 from .motor import Motor as Motor
 from .movement import Movement as Movement
 from .movement.measures import (
@@ -34,6 +44,7 @@ from .plants import (
 from .plants import (
     make_plant as make_plant,
 )
+from .plants.fixation import Fixations as Fixations
 from .recording import record as record
 from .recording.frames import (
     frames as frames,
@@ -41,6 +52,7 @@ from .recording.frames import (
 from .recording.frames import (
     write_film as write_film,
 )
+from .recording.sequence import record_sequence as record_sequence
 from .search.optimum import find_optimum as find_optimum
 from .search.optimum_cache import searched_optimum as searched_optimum
 from .state import State as State
@@ -54,6 +66,7 @@ from .sysid import (
 from .sysid import (
     read_recordings as read_recordings,
 )
+from .sysid.modes import identify_modes as identify_modes
 from .task.cases import (
     CASES as CASES,
 )

@@ -31,6 +31,7 @@ COMMANDS = {
     "evaluate": "orient_eye.cli.evaluate:Evaluate",
     "export": "orient_eye.cli.export:Export",
     "optimum": "orient_eye.cli.optimum:Optimum",
+    "listing": "orient_eye.cli.listing:Listing",
     "weights": "orient_eye.cli.weights:Weights",
     "validate": "orient_eye.cli.validate:Validate",
 }

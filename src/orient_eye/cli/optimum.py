@@ -24,11 +24,13 @@ if TYPE_CHECKING:
 class Optimum:
     """Search the best action for a saccade: B, D and k0 with the largest reward, on any plant.
 
-    Simplices from the best of a sample over the whole box of actions. What was found is kept in the user's cache
-    and remembered when the same saccades are asked for again. --check searches once more by another program and exits
+    Simplices from the best of a sample over the whole box of actions; of several motors' numbers, evolution strategies.
+    What was found is kept in the user's cache and remembered when the same saccades are asked for again. --check searches once more by another program and exits
     with 1 when that finds something better by more than 0.1 %.
 
     $ orient-eye optimum --start 0 --target 30
+
+    $ orient-eye optimum --plant tavares --targets gaze --start 0 0 --target 20 -10
 
     $ orient-eye optimum --plant mujoco --case 2-varying --start -10 --target 15 --check
 
@@ -43,7 +45,8 @@ class Optimum:
         tuple[float, ...] | None,
         tyro.conf.arg(metavar="WEIGHT ...", help_behavior_hint="(default: those of the case on the plant)"),
     ] = None
-    """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32; orient-eye weights)."""
+    """Weights of the reward: accuracy, energy, duration, overshoot (thesis 4.32; orient-eye weights), and of gaze
+    targets force."""
     check: bool = False
     """Search a second time, independently: scipy's differential evolution, polished by Nelder and Mead's simplex."""
     out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(optional)")] = None
@@ -63,7 +66,7 @@ class Optimum:
         plant, targets = self.problem.made()
         start, target = saccades(targets, *self.saccades.angles(targets))
         _refuse_no_saccade(start, target)
-        task = self.problem.task(plant, targets, case, self.weights)
+        task = self.problem.task(plant, targets, case, self.weights).plain
         best, remembered = self._search(task, start, target)
         outcome = task.perform(start, best.action, target)
         rows = with_peaks(task, outcome, outcome_rows(task, start, target, best.action, outcome))

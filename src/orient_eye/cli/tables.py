@@ -81,11 +81,16 @@ def saccade_columns(task: "SaccadeTask", row: Row, *, terms: bool = False) -> di
     columns: dict[str, Callable[[Row], Cell]] = {
         "saccade [deg]": lambda row: f"{told('start', row)} to {told('target', row)}"
     }
-    for key in row:
-        if key.startswith("F_"):
-            columns[f"{key.rsplit('_', 1)[0]} [{key.rsplit('_', 1)[1]}]"] = column(key, ".3f")
-    for name, told_of in zip(task.actions.names, task.actions.numbers, strict=True):
-        columns[f"{name} [{told_of.unit}]"] = column(name if name in row else f"{name}_{told_of.unit}")
+    actions = task.actions.plain
+    driven = dict.fromkeys(told_of.motor for told_of in actions.numbers)
+    if len(driven) > 1:
+        columns["motor"] = lambda row: "\n".join(driven)
+    columns |= {f"F [{unit}]": _stacked(keys, ".3f") for unit, keys in _starts(row).items()}
+    keys: dict[str, list[str]] = {}
+    for name, told_of in zip(actions.names, actions.numbers, strict=True):
+        key = name if name in row else f"{name}_{told_of.unit}"
+        keys.setdefault(f"{told_of.symbol} [{told_of.unit}]", []).append(key)
+    columns |= {heading: _stacked(of_motors, ".5g") for heading, of_motors in keys.items()}
     for key in row:
         if key == "C" or key.startswith("C_"):
             columns[f"{key} [1/s]"] = _onset(key)
@@ -107,6 +112,20 @@ def saccade_columns(task: "SaccadeTask", row: Row, *, terms: bool = False) -> di
 
 _PEAKS = {"motor speed": ("motor_speed", "deg/s"), "motor acc.": ("motor_acceleration", "deg/s²")}
 """Heading to key and unit; the columns are motor_speed_deg_s, motor_speed_limit_deg_s, of several with their names."""
+
+
+def _starts(row: Row) -> dict[str, list[str]]:
+    """Keys of where motors start, by their unit."""
+    found: dict[str, list[str]] = {}
+    for key in row:
+        if key.startswith("F_"):
+            found.setdefault(key.rsplit("_", 1)[1], []).append(key)
+    return found
+
+
+def _stacked(keys: Sequence[str], form: str) -> Callable[[Row], Cell]:
+    """Numbers of several motors, one below the other."""
+    return lambda row: "\n".join(number(row[key], form) for key in keys)
 
 
 def _is_peak(name: str, key: str) -> bool:
@@ -143,7 +162,7 @@ def say_limits(task: "SaccadeTask", rows: Sequence[Row]) -> None:
     """In words what a limit did to the commands of saccades; nothing where none did anything."""
     count = {name: sum(bool(row[name]) for row in rows) for name in ("too_fast", "limited", "saturated")}
     if count["too_fast"]:
-        V = getattr(task.actions, "speed_limit", None)
+        V = getattr(task.actions.plain, "speed_limit", None)
         limit = "its speed limit" if V is None else f"the speed limit of {V:g} deg/s"
         say(f"too fast: no C holds {count['too_fast']} of {len(rows)} commands to {limit}", "red")
     if count["limited"]:

@@ -84,7 +84,7 @@ def _say_task(task: "SaccadeTask") -> None:
     from orient_eye.task.known_weights import bounds, compared_with_thesis
 
     units = dict(zip(task.actions.names, (n.unit for n in task.actions.numbers), strict=True))
-    told = (f"{name} from {low:.4g} to {high:.4g} {units[name]}" for name, (low, high) in bounds(task).items())
+    told = (f"{name} from {low:.4g} to {high:.4g} {units[name]}".rstrip() for name, (low, high) in bounds(task).items())
     say(f"actions: {', '.join(told)}")
     weights = ", ".join(f"{name} {value:.3g}" for name, value in task.weights.items())
     say(f"weights of the reward: {weights}; {task.weights_from}")

@@ -67,7 +67,7 @@ class Weights:
         terms = [name for name in JUDGES[targets.of].names if name != "energy"]
         steps = Steps(self.step_B, self.step_D, self.step_k0)
         rows = [self._solve(plant, targets, name, case, steps) for name, case in self._cases().items()]
-        solved = [key for key in rows[0] if key.split("_")[0] in ("D", "k0")]
+        solved = [k for k in rows[0] if k.split("_")[0] in ("D", "k0") and any(row[k] is not None for row in rows)]
         columns = {
             "case": lambda row: row["case"],
             **{f"lambda_{name[0]} ({name})": _weight(name) for name in terms},
@@ -110,10 +110,10 @@ class Weights:
 
         from orient_eye.errors import InputError
         from orient_eye.task.judge import JUDGES
-        from orient_eye.task.known_weights import solve
+        from orient_eye.task.known_weights import solve, with_known_weights
         from orient_eye.task.solved_weights import Steps, resolve, solve_at
 
-        dummy = dict.fromkeys(JUDGES[targets.of].names, 1.0)  # a task has weights, and these do not matter
+        dummy = JUDGES[targets.of].any_weights
         task = self.problem.task(plant, targets, case, dummy)
         row = {"case": name, **{key: task.actions.identity().get(key) for key in ("pulse", "C")}}
         chosen, usual = self._chosen(targets), Weights()._chosen(targets)
@@ -125,7 +125,8 @@ class Weights:
             if chosen != usual or steps != Steps():
                 raise InputError(f"case {name}: {error}") from error
         if chosen == usual and steps == Steps():
-            known, where = solve(task)
+            kept = with_known_weights(task) if not weights else None
+            known, where = solve(task) if kept is None else (dict(kept.weights), kept.weights_from)
             if known != weights:  # told by another saccade, which stands in the words
                 weights, how, action = known, where, np.full(len(action), np.nan)
         told = [float(value) if np.isfinite(value) else None for value in action]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from orient_eye.constants import BAND
+from orient_eye.constants import BAND, DOUBT
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,6 +52,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "reward_scale": "raw",
     },
 }
+FINE_TUNING: dict[str, Any] = {"updates": 3000, "temperature": (3e-3, 3e-4), "learning_rate": 1e-3}
+"""What differs where a run begins with a policy."""
 _LARGEST = {
     "updates": 10**9,
     "updates_per_rollout": 10**4,
@@ -83,11 +85,18 @@ class TrainConfig:
         tuple[float, ...] | dict[str, float] | None,
         tyro.conf.arg(metavar="WEIGHT ...", help_behavior_hint="(default: those of the case on the plant)"),
     ] = None
-    """Weights of the reward's terms: accuracy, energy, duration, overshoot (thesis 4.32; see orient-eye weights)."""
+    """Weights of the reward's terms: accuracy, energy, duration, overshoot (thesis 4.32; see orient-eye weights), and
+    between gaze targets force (docs/gaze.md)."""
     end_point_error_deg: Annotated[
         float | None, tyro.conf.arg(name="end-point-error", help_behavior_hint="(default: 0.25 on a rig)")
     ] = None
     """End-point error one can live with, deg at 5 deg: sets the weights by rule, on any plant (docs/weights.md)."""
+    torsion: Annotated[Literal["least force", "listing", "fick"] | None, _default("that of the least force")] = None
+    """Torsion with which the usual command of gaze targets holds its target: the policy's actions are told from that
+    command, and it begins with it."""
+    origin: Annotated[str | None, tyro.conf.arg(name="from", metavar="POLICY", help_behavior_hint="(optional)")] = None
+    """A policy to begin with, of the same targets and kind of actions: fine-tuning on another plant. Its first tenth
+    trains the Q network alone."""
     robust: bool = False
     """Perform each saccade on another eye of the 95 % intervals that sysid found, and say what that costs."""
     band: float = BAND
@@ -96,32 +105,42 @@ class TrainConfig:
     """How long a simulated saccade lasts, in s."""
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
-    updates: Annotated[int | None, _default("10000, 7000 on a simulated eye; thesis 300000")] = None
+    updates: Annotated[
+        int | None, _default("10000, 7000 on a simulated eye; gaze 26000, with --from 3000; thesis 300000")
+    ] = None
     """How many times the networks are updated; a multiple of 8 is quickest with ours."""
     saccades_per_update: Annotated[int | None, _default("16; thesis 1")] = None
     """Fresh saccades performed for each update."""
     updates_per_rollout: Annotated[int | None, _default("8, or what divides the updates; thesis 1")] = None
     """Updates between two rollouts: a rollout performs the saccades of that many updates in one batch."""
-    batch_size: Annotated[int | None, _default("512; thesis 8196")] = None
+    batch_size: Annotated[int | None, _default("512; gaze 1024; thesis 8196")] = None
     """Saccades that one update learns from."""
-    replay_size: Annotated[int | None, _default("60000; thesis 30000")] = None
+    replay_size: Annotated[int | None, _default("60000; gaze 150000; thesis 30000")] = None
     """Saccades that the replay buffer holds."""
     warmup: Annotated[int | None, _default("4096; thesis 8196")] = None
     """Saccades with random actions before the first update."""
-    learning_rate: Annotated[float | None, _default("0.003; thesis 0.00001")] = None
+    learning_rate: Annotated[float | None, _default("0.003; with --from 0.001; thesis 0.00001")] = None
     """Learning rate of the optimiser (Adam)."""
     last_learning_rate: Annotated[float | None, _default("0.03; thesis 1")] = None
     """Share of the learning rate that is left at the end; it falls linearly over the last 60 % of the run."""
     second_moment: Annotated[float | None, _default("0.98; thesis 0.999")] = None
     """Adam's decay of its mean of squared gradients: how long a large gradient is remembered."""
-    temperature: Annotated[tuple[float, float] | Literal["auto"] | None, _default("0.1 0.001; thesis auto")] = None
+    temperature: Annotated[
+        tuple[float, float] | Literal["auto"] | None,
+        _default("0.1 0.001; gaze 0.02 0.0003, with --from 0.003 0.0003; thesis auto"),
+    ] = None
     """Entropy temperature at the beginning and at the end; it falls geometrically over the first 80 % of the run.
     With auto it follows the automatic rule of Stable-Baselines3."""
     reward_scale: Annotated[Literal["log", "raw"] | None, _default("log; thesis raw")] = None
     """Whether to learn on the logarithm of the reward, which has the same optimal policy, or on the raw reward."""
+    doubt: Annotated[float | None, _default("0.000001; gaze 0.001")] = None
+    """Share of the amplitude by which a measure may be wrong while the policy learns, because a simulated saccade was
+    not stepped on until nothing is left of it; it is always judged at 0.000001."""
     device: str = "cpu"
     """Device on which the networks live: cpu, cuda, or cuda:NUMBER."""
-    evaluation_pairs: Annotated[int | None, _default("300 in closed form, 30 on a rig, 60 simulated")] = None
+    evaluation_pairs: Annotated[
+        int | None, _default("300 in closed form, 30 on a rig, 60 simulated, 24 between gaze targets")
+    ] = None
     """Random saccades on which the policy is held against the searched optimum."""
     seed: int = 0
     """Seed of everything random in the run."""
@@ -144,7 +163,7 @@ class TrainConfig:
         targets = make_targets(self.targets, plant, driven=self.driven)
         weights = self.weights
         if self.end_point_error_deg is not None:
-            weights = dict.fromkeys(JUDGES[targets.of].names, 1.0)  # until they are set
+            weights = JUDGES[targets.of].any_weights  # until they are set
         task = SaccadeTask.of_case(
             plant,
             self.case,
@@ -154,6 +173,7 @@ class TrainConfig:
             band=self.band,
             speed_limit=self.speed_limit,
             horizon_s=self.horizon_s,
+            action_options=None if self.torsion is None else {"rule": self.torsion},
         )
         if self.end_point_error_deg is None:
             return task
@@ -177,10 +197,13 @@ class TrainConfig:
             "updates": task.plant.updates,
             "evaluation_pairs": task.plant.evaluation_pairs,
             **PRESETS[self.preset],
+            **(task.targets.learning if self.preset == "ours" else {}),
+            **({} if self.origin is None else FINE_TUNING),
             **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},
         }
         if self.updates_per_rollout is None and _whole(values["updates"]):
             values["updates_per_rollout"] = math.gcd(values["updates"], values["updates_per_rollout"])
+        values["origin"] = self.origin
         values["robust"] = _intervals(task) if self.robust else {}
         return TrainSettings(task=task.identity(), weights_from=task.weights_from, **values)
 
@@ -193,6 +216,8 @@ class TrainSettings:
         task: identity of plant, actions, targets and reward (`SaccadeTask.identity`).
         weights_from: where the reward's weights are from, in words.
         case: name of the learning case.
+        doubt: that of the plant on which it learns.
+        origin: the policy with which it begins, as it was named; None for a new one.
         robust: low and high of the plant's numbers, drawn anew for each saccade; none for the plant as it is.
 
     The others are those of `TrainConfig`.
@@ -218,6 +243,8 @@ class TrainSettings:
     device: str
     evaluation_pairs: int
     seed: int
+    doubt: float = DOUBT
+    origin: str | None = None
     robust: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -231,6 +258,7 @@ class TrainSettings:
         _require(_positive(self.learning_rate), "learning_rate", "positive and finite", self.learning_rate)
         share = self.last_learning_rate
         _require(_positive(share) and share <= 1, "last_learning_rate", "a share above 0, at most 1", share)
+        _require(_positive(self.doubt) and self.doubt < 1, "doubt", "a share above 0, below 1", self.doubt)
         temperature: Any = self.temperature
         if isinstance(temperature, list):  # as JSON has it
             temperature = tuple(temperature)

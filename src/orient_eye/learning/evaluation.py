@@ -3,7 +3,7 @@
 The gap of a saccade is (R* - R) / |R*|, with R* the reward of the searched optimum.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,18 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orient_eye import rotations
+from orient_eye.learning.directions import in_all_directions, opposite, size_deg, way_in_words
 from orient_eye.search.optimum import Optimum
 from orient_eye.search.optimum_cache import searched_optimum, task_key
 from orient_eye.search.optimum_file import NAME, Found, write_optimum
 from orient_eye.state import State
 from orient_eye.task.saccade import Outcome, SaccadeTask
+from orient_eye.task.targets import Targets
 
 Array = NDArray[np.float64]
 Act = Callable[[Array, Array], Array]
 """From starts and targets (saccades, 4) to actions in units (saccades, numbers)."""
 TABLE_AMPLITUDES_DEG = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0)
 """Amplitudes of the table at the end of a run; symmetric saccades."""
+TABLE_IN_ALL_DIRECTIONS = (5.0, 10.0, 30.0), (0.0, 45.0, 90.0)
+"""Amplitudes of the table in all directions, and whereto: 0 left, 90 deg up."""
 LARGE_DEG = 5.0
 """Above this size the distance from the best action is told: of smaller ones B and k0 hardly matter."""
 _SEED = 2021
@@ -36,7 +39,7 @@ class Yardstick:
         task: plant, actions and reward.
         start: of the eyes, of (saccades,).
         target: desired orientations, (saccades, 4).
-        optimum: best actions and rewards found.
+        optimum: best actions of the plain task (`SaccadeTask.plain`) and rewards found.
     """
 
     task: SaccadeTask
@@ -54,7 +57,8 @@ class Yardstick:
         carried: Path | None = None,
     ) -> "Yardstick":
         """Take the optimum of saccades from a file that travels, remember it, or search it."""
-        return cls(task, start, target, searched_optimum(task, start, target, progress=progress, carried=carried))
+        found = searched_optimum(task, start, target, progress=progress, carried=carried)
+        return cls(task, start, target, found)
 
     def __getitem__(self, which: slice) -> "Yardstick":
         optimum = Optimum(self.optimum.action[which], self.optimum.reward[which], self.optimum.evaluations)
@@ -62,8 +66,23 @@ class Yardstick:
 
     @property
     def size_deg(self) -> Array:
-        """Angle from start to target, (saccades,)."""
-        return rotations.angle_between(self.start.orientation, self.target)
+        """Angle from start to target, or where saccades go in all directions that of their gaze, (saccades,)."""
+        return size_deg(self.task, self.start.orientation, self.target)
+
+    @property
+    def ways(self) -> list[str] | None:
+        """Whereto saccades go in words; None where they all go about one axis."""
+        return way_in_words(self.start.orientation, self.target) if in_all_directions(self.task) else None
+
+    @property
+    def titles(self) -> list[str]:
+        """Of the saccades in a recording: "30 deg", and whereto in all directions."""
+        ways = self.ways or [""] * len(self.target)
+        return [f"{size:g} deg {way}".rstrip() for size, way in zip(self.size_deg.round(6), ways, strict=True)]
+
+    def plain(self, action: Array) -> Array:
+        """Actions (saccades, numbers) told as those of the plain task."""
+        return self.task.actions.as_plain(self.start, self.target, action)
 
     def perform(self, act: Act) -> tuple[Array, Outcome, Array]:
         """The policy's actions (saccades, numbers), what came of them, and the gaps (saccades,)."""
@@ -81,6 +100,8 @@ def evaluation_saccades(
 ) -> tuple[Yardstick, Yardstick]:
     """Random saccades over the whole range, and symmetric ones of the table's amplitudes, as far as the range goes.
 
+    In all directions those of the table go to the left, up, and obliquely.
+
     They depend on nothing but the targets and their number, so that runs can be compared and their optimum is
     searched once. Fewer than are usual on the plant are the first of those.
 
@@ -93,13 +114,22 @@ def evaluation_saccades(
     targets = task.targets
     start, target = targets.draw(max(count, task.plant.evaluation_pairs), np.random.default_rng(_SEED))
     start, target = start[:count], target[:count]
-    angles = targets.symmetric(np.array(TABLE_AMPLITUDES_DEG))
+    sizes, around = TABLE_IN_ALL_DIRECTIONS if in_all_directions(task) else (TABLE_AMPLITUDES_DEG, None)
+    angles = _symmetric(targets, np.array(sizes), around)
     if not len(angles[0]):
-        angles = targets.symmetric(np.array([2 * targets.limit_deg]))
+        angles = _symmetric(targets, np.array([2 * targets.limit_deg]), around)
     low, high = map(targets.orientation, angles)
     start = targets.rest(np.concatenate([start.orientation, low]))
     both = Yardstick.search(task, start, np.concatenate([target, high]), progress, carried)
     return both[:count], both[count:]
+
+
+def _symmetric(targets: Targets, sizes: Array, around_deg: Sequence[float] | None) -> tuple[Array, Array]:
+    """Angles of starts and targets of every size that the range holds, in every direction where there are several."""
+    if around_deg is None:
+        return targets.symmetric(sizes)
+    around, size = np.meshgrid(around_deg, sizes[sizes <= 2 * targets.limit_deg], indexing="ij")
+    return opposite(targets, size.ravel(), around.ravel())
 
 
 def carry_optimum(pairs: Yardstick, table: Yardstick, folder: Path) -> Path:
@@ -145,10 +175,10 @@ class Told:
 
 def told_numbers(task: SaccadeTask) -> tuple[Told, ...]:
     """How the numbers of a task's actions are told."""
-    units = {motor.name: motor.unit for motor in task.plant.motors}
-    several = len({number.motor for number in task.actions.numbers}) > 1
+    units, actions = {motor.name: motor.unit for motor in task.plant.motors}, task.actions.plain
+    several = len({number.motor for number in actions.numbers}) > 1
     told = []
-    for i, (name, number) in enumerate(zip(task.actions.names, task.actions.numbers, strict=True)):
+    for i, (name, number) in enumerate(zip(actions.names, actions.numbers, strict=True)):
         position = units.get(number.motor) == number.unit
         step = f"step_{number.motor}_{number.unit}" if several else f"step_{number.unit}"
         label = f"{number.symbol} - F" if position else number.symbol
@@ -157,7 +187,7 @@ def told_numbers(task: SaccadeTask) -> tuple[Told, ...]:
 
 
 def told_values(task: SaccadeTask, start: State, action: Array) -> Array:
-    """Actions (saccades, numbers) as `told_numbers` tells them."""
+    """Actions of the plain task (saccades, numbers) as `told_numbers` tells them."""
     values = action.copy()
     column = {motor.name: i for i, motor in enumerate(task.plant.motors)}
     for told in told_numbers(task):
@@ -180,8 +210,8 @@ def gap_summary(yardstick: Yardstick, action: Array, outcome: Outcome, gap: Arra
         `amplitude_table`: key, label and unit of each.
     """
     large = yardstick.size_deg > LARGE_DEG
-    off = np.abs(action - yardstick.optimum.action)[large]
-    names = yardstick.task.actions.names
+    off = np.abs(yardstick.plain(action) - yardstick.optimum.action)[large]
+    names = yardstick.task.actions.plain.names
     return {
         "pairs": len(gap),
         "gap_mean": float(gap.mean()),
@@ -195,15 +225,16 @@ def gap_summary(yardstick: Yardstick, action: Array, outcome: Outcome, gap: Arra
     }
 
 
-def amplitude_table(yardstick: Yardstick, act: Act) -> list[dict[str, float]]:
+def amplitude_table(yardstick: Yardstick, act: Act) -> list[dict[str, Any]]:
     """One row a saccade: amplitude, the numbers of the learned and of the best action, rewards, gap and measures.
 
-    The numbers stand under their keys (`told_numbers`), the best ones under KEY_best.
+    The numbers stand under their keys (`told_numbers`), the best ones under KEY_best; in all directions `direction`
+    says whereto the saccade goes.
     """
     task = yardstick.task
     action, outcome, gap = yardstick.perform(act)
     measures = outcome.measures
-    ours, best = (told_values(task, yardstick.start, a) for a in (action, yardstick.optimum.action))
+    ours, best = (told_values(task, yardstick.start, a) for a in (yardstick.plain(action), yardstick.optimum.action))
     columns: dict[str, Array] = {"amplitude_deg": yardstick.size_deg.round(9)}
     for number in told_numbers(task):
         columns |= {number.key: ours[:, number.index], f"{number.key}_best": best[:, number.index]}
@@ -216,4 +247,5 @@ def amplitude_table(yardstick: Yardstick, act: Act) -> list[dict[str, float]]:
         "skewness": measures.skewness,
         "overshoot": measures.overshoot,
     }
-    return [{name: float(values[i]) for name, values in columns.items()} for i in range(len(gap))]
+    told = [{}] * len(gap) if yardstick.ways is None else [{"direction": way} for way in yardstick.ways]
+    return [{**told[i], **{name: float(values[i]) for name, values in columns.items()}} for i in range(len(gap))]

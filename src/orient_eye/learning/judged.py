@@ -10,18 +10,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orient_eye.figures import save
 from orient_eye.learning import figures
+from orient_eye.learning.directions import in_all_directions
 from orient_eye.learning.evaluation import Yardstick, amplitude_table, gap_summary
+from orient_eye.learning.figures.saccades import Saccades
+from orient_eye.learning.gaze_numbers import gaze_numbers, stretching
 from orient_eye.learning.policy import Policy
 from orient_eye.recording import record
 from orient_eye.task.table import outcome_columns, rows_of, with_peaks
 from orient_eye.words import plant_in_words
 
+Array = NDArray[np.float64]
+
 
 def measure_policy(policy: Policy, pairs: Yardstick, table: Yardstick) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Numbers of all saccades together, and one row a saccade beside its optimum (..._best); plain values.
+
+    In all directions also numbers of the gaze and of torsion (`orient_eye.learning.gaze_numbers`), those of the optimum
+    as ..._best.
 
     Args:
         policy: that acts.
@@ -32,7 +41,7 @@ def measure_policy(policy: Policy, pairs: Yardstick, table: Yardstick) -> tuple[
     action, outcome, gap = pairs.perform(policy.act)
     best = pairs.optimum.action
     ours = outcome_columns(task, start, target, action, outcome)
-    others = outcome_columns(task, start, target, best, task.perform(start, best, target))
+    others = outcome_columns(task.plain, start, target, best, task.plain.perform(start, best, target))
     beside = {f"{key}_best": v for key, v in others.items() if not key.startswith(("start_", "target_", "F_"))}
     rows = with_peaks(task, outcome, rows_of({**ours, "gap": gap}))
     errors: dict[str, float] = {}
@@ -43,6 +52,7 @@ def measure_policy(policy: Policy, pairs: Yardstick, table: Yardstick) -> tuple[
     numbers = {
         **gap_summary(pairs, action, outcome, gap),
         **errors,
+        **(_of_gaze(policy, pairs, pairs.plain(action)) if in_all_directions(task) else {}),
         "overshoot_max": float(np.nanmax(outcome.measures.overshoot)),
         "failed_saccades": int(outcome.measures.failed.sum()),
         "limited_saccades": int(outcome.limited.sum()),
@@ -52,19 +62,29 @@ def measure_policy(policy: Policy, pairs: Yardstick, table: Yardstick) -> tuple[
     return numbers, [row | more for row, more in zip(rows, rows_of(beside), strict=True)]
 
 
-def draw_policy_figures(policy: Policy, pairs: Yardstick, table: Yardstick, folder: Path) -> None:
-    """The pictures figure_5_*.png."""
+def _of_gaze(policy: Policy, pairs: Yardstick, action: Array) -> dict[str, float | None]:
+    """Numbers of the gaze and of torsion under the policy's plain actions (saccades, numbers), and under the best."""
+    made, best = (Saccades(pairs.task.plain, pairs.start, pairs.target, a) for a in (action, pairs.optimum.action))
+    ours = {**gaze_numbers(made), **stretching(pairs.task, policy, made)}
+    return ours | {f"{name}_best": value for name, value in gaze_numbers(best).items()}
+
+
+def draw_policy_figures(policy: Policy, pairs: Yardstick, table: Yardstick, folder: Path) -> list[str]:
+    """The pictures that suit the task, named after the thesis' figures or after what they show; returns their names."""
     task = pairs.task
-    pictures = {
-        "figure_5_1": figures.figure_5_1(policy, pairs, table),
-        "figure_5_2": figures.figure_5_2(policy, task),
-        "figure_5_3": figures.figure_5_3(policy, task),
-        "figure_5_4": figures.figure_5_4(policy, task),
-        "figure_5_24": figures.figure_5_24(policy, table),
-        "figure_5_25": figures.figure_5_25(policy, pairs),
-    }
-    for name, figure in pictures.items():
-        save(figure, folder / f"{name}.png")
+    pictures = (
+        figures.gaze_pictures(policy, pairs)
+        if in_all_directions(task)
+        else {
+            "figure_5_1": figures.figure_5_1(policy, pairs, table),
+            "figure_5_2": figures.figure_5_2(policy, task),
+            "figure_5_3": figures.figure_5_3(policy, task),
+            "figure_5_4": figures.figure_5_4(policy, task),
+            "figure_5_25": figures.figure_5_25(policy, pairs),
+        }
+    )
+    pictures["figure_5_24"] = figures.figure_5_24(policy, table)
+    return [save(figure, folder / f"{name}.png").name for name, figure in pictures.items()]
 
 
 def record_policy(policy: Policy, table: Yardstick, path: Path) -> Path:
@@ -75,8 +95,8 @@ def record_policy(policy: Policy, table: Yardstick, path: Path) -> Path:
         task.trajectory(table.start, policy.act(table.start.orientation, table.target), table.target),
         model=task.plant.drawn(),
         target=table.target,
-        titles=[f"{size:g} deg" for size in table.size_deg],
-        reference=task.trajectory(table.start, table.optimum.action, table.target),
+        titles=table.titles,
+        reference=task.plain.trajectory(table.start, table.optimum.action, table.target),
         notes=f"Saccades of a policy on plant `{plant_in_words(task.plant.identity())}`, in grey with the best action "
         "a search found.",
     )

@@ -140,6 +140,20 @@ class Policy:
         """
         return SaccadeTask.restore(self.manifest["task"], plant)
 
+    def require_actions(self, task: SaccadeTask) -> None:
+        """Refuse a task whose actions mean something else, or whose targets are told by other angles.
+
+        Raises:
+            InputError: says what differs.
+        """
+        own = self.task()
+        told = [(t.actions.names, t.targets.name, t.actions.identity().get("rule")) for t in (own, task)]
+        if told[0] != told[1] or self.inputs != GAZE_INPUTS:
+            raise InputError(
+                f"the policy to begin with gives {', '.join(told[0][0])} for {told[0][1]} targets, this task takes "
+                f"{', '.join(told[1][0])} for {told[1][1]} ones; begin with a policy of the same kind"
+            )
+
     def require(self, task: SaccadeTask, *, force: bool = False) -> list[str]:
         """Refuse a task the policy was not trained on.
 
@@ -242,12 +256,22 @@ def _differences(trained: dict[str, Any], here: dict[str, Any]) -> list[str]:
     one, two = (_parts(task, skip="plant" if other_plant else "") for task in (trained, here))
     for part, key in dict.fromkeys((*one, *two)):
         first, second = one.get((part, key)), two.get((part, key))
-        if first != second and not (other_plant and key in _FOLLOW_THE_PLANT):
+        if not _same(first, second) and not (other_plant and key in _FOLLOW_THE_PLANT):
             name = f"motor's {_WORDS[key]}" if (part, key) == ("plant", "speed_limit") else _WORDS.get(key, key)
             words.append(f"{name} {in_words(first)}, not {in_words(second)}")
             if key == "model":
                 words[-1] += " (the MJCF changed, or MuJoCo's version)"
     return words
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two plain values are the same, numbers to six digits: bounds that were solved differ from machine to
+    machine in the last ones."""
+    if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
+        return len(one) == len(other) and all(_same(a, b) for a, b in zip(one, other, strict=True))
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=1e-6)
+    return bool(one == other)
 
 
 def _parts(identity: dict[str, Any], skip: str) -> dict[tuple[str, str], Any]:

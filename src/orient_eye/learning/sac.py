@@ -7,10 +7,12 @@ interface: `predict`, `save`, `load`, `learn`, callbacks, loggers.
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import SAC
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
@@ -21,6 +23,7 @@ from orient_eye.learning.features import GAZE_INPUTS
 from orient_eye.learning.network import Network, flatten, take_step
 from orient_eye.learning.torch_policy import gaze_features
 
+Array = NDArray[np.float64]
 Schedule = Callable[[float], float]
 _HALF_LOG_2_PI = 0.5 * math.log(2 * math.pi)
 
@@ -56,14 +59,18 @@ class OneStepSAC(SAC):
         env: as in SAC; every step must end its episode.
         temperature: entropy temperature, a function of the remaining share of training; None for `ent_coef`,
             as in SAC.
+        policy_waits: updates of the Q network before the first one of the policy, which an untrained Q would spoil
+            where it is a good one already.
         settings: the other keywords of SAC.
 
     Raises:
         InputError: two temperatures, or networks whose gradients are not written out here.
     """
 
-    def __init__(self, policy: Any, env: Any, *, temperature: Schedule | None = None, **settings: Any) -> None:
-        self.temperature = temperature
+    def __init__(
+        self, policy: Any, env: Any, *, temperature: Schedule | None = None, policy_waits: int = 0, **settings: Any
+    ) -> None:
+        self.temperature, self.policy_waits = temperature, policy_waits
         if temperature is not None:
             if "ent_coef" in settings:
                 raise InputError("give temperature or ent_coef, not both")
@@ -103,14 +110,16 @@ class OneStepSAC(SAC):
         q_loss = policy_loss = torch.zeros((), device=self.device)
         # Moments of silent units fade into denormal numbers, at which a processor is many times slower.
         torch.set_flush_denormal(True)
-        for _ in range(gradient_steps):
+        temperature = self.ent_coef_tensor if self.log_ent_coef is None else self.log_ent_coef.detach().exp()
+        for step in range(gradient_steps):
             assert self.replay_buffer is not None
             data = self.replay_buffer.sample(batch_size, env=self._vec_normalize_env)
             with torch.no_grad():
                 features = self.actor.extract_features(data.observations, self.actor.features_extractor)
                 q_loss = q_loss + self._update_q(features, data.actions, data.rewards)
-                loss, temperature = self._update_policy(features)
-                policy_loss = policy_loss + loss
+                if self._n_updates + step >= self.policy_waits:
+                    loss, temperature = self._update_policy(features)
+                    policy_loss = policy_loss + loss
         torch.set_flush_denormal(False)
 
         self._n_updates += gradient_steps
@@ -162,6 +171,29 @@ class OneStepSAC(SAC):
         self._policy.backward(outputs, by_outputs, of_parameters=True, of_input=False)
         take_step(self.actor.optimizer)
         return -(temperature * entropy + value.sum() / n), temperature
+
+    def begin_with(self, weights: Sequence[Array], biases: Sequence[Array], spread: float) -> None:
+        """Put a policy in the place of the random one.
+
+        Args:
+            weights: of its layers, (inputs, outputs) each, the last one's for the mean.
+            biases: of the layers.
+            spread: standard deviation of its actions before they are squashed.
+
+        Raises:
+            InputError: layers of other shapes.
+        """
+        layers = [m for m in [*self.actor.latent_pi, self.actor.mu] if isinstance(m, nn.Linear)]
+        shapes = [tuple(layer.weight.shape[::-1]) for layer in layers]
+        if [np.shape(weight) for weight in weights] != shapes:
+            raise InputError(f"the policy to begin with has layers {[np.shape(w) for w in weights]}, not {shapes}")
+        with torch.no_grad():
+            for layer, weight, bias in zip(layers, weights, biases, strict=True):
+                layer.weight.copy_(torch.as_tensor(weight.T))
+                layer.bias.copy_(torch.as_tensor(bias))
+            log_std = cast(nn.Linear, self.actor.log_std)
+            log_std.weight.zero_()
+            log_std.bias.fill_(math.log(spread))
 
     def finite(self) -> bool:
         """Whether the parameters of both networks are finite numbers."""

@@ -21,14 +21,14 @@ def record_stages(task: SaccadeTask, folder: Path, table: Yardstick) -> Path:
     if not files:
         raise InputError(f"{folder} has no stages to record")
     parts = [Trajectory.load_npz(file) for file in files]
-    parts.append(task.trajectory(table.start, table.optimum.action, table.target))
+    parts.append(task.plain.trajectory(table.start, table.optimum.action, table.target))
     names = [f"trained {int(file.stem)} %" for file in files] + ["searched optimum"]
     return record(
         folder / "recording.rrd",
         concatenate(parts),
         model=task.plant.drawn(),
         target=np.concatenate([table.target] * len(parts)),
-        titles=[f"{size:g} deg" for size in table.size_deg] * len(parts),
+        titles=table.titles * len(parts),
         groups=[name for name in names for _ in table.size_deg],
         notes=f"Evaluation saccades of the training run `{folder.name}` on plant `{task.plant.name}`, at several "
         "stages of the training, and with the best action a search found.",

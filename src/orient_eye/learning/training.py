@@ -7,6 +7,7 @@ stages/ (evaluation saccades at several stages), checkpoint.pt, policy.safetenso
 policy.png and recording.rrd.
 """
 
+import copy
 import math
 import warnings
 from collections.abc import Callable
@@ -38,6 +39,8 @@ from orient_eye.task.known_weights import bounds, compared_with_thesis
 from orient_eye.task.saccade import SaccadeTask
 
 _NETS = [128, 128, 32]  # thesis 4.6
+_WAITS = 0.1  # of the run, while the policy it began with waits for a Q that knows what it is worth
+_SPREAD = 0.1  # of that policy's actions
 _FALLING = 0.6  # of the run, at its end, in which the learning rate falls
 
 
@@ -85,6 +88,7 @@ def train(
     _check_interval(checkpoint_s)
     task = config.make_task()  # before the directory: bad input leaves nothing behind
     settings = config.resolved(task)
+    _origin(settings, task)
     run = RunDirectory.create(out, "train", settings, seed=settings.seed)
     if begun is not None:
         begun(task)
@@ -119,6 +123,15 @@ def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOIN
     remove_leftovers(folder)
     begun = (folder / CHECKPOINT).exists()
     return _Run(settings, task, run, checkpoint_s, quiet).execute(resume=begun)
+
+
+def _origin(settings: TrainSettings, task: SaccadeTask) -> Policy | None:
+    """The policy with which a run begins, where there is one."""
+    if settings.origin is None:
+        return None
+    policy = Policy.load(settings.origin)
+    policy.require_actions(task)
+    return policy
 
 
 def _check_interval(checkpoint_s: float) -> None:
@@ -167,6 +180,9 @@ class _Run:
 
     def _env(self) -> SaccadeVecEnv:
         settings, task = self.settings, self.task
+        plant = copy.copy(task.plant)
+        plant.doubt = settings.doubt
+        task = replace(task, plant=plant)
         if settings.robust:  # each saccade on another eye, drawn from the environment's generator
             task = replace(task, plant=uncertain(task.plant, settings.robust))
         log = settings.reward_scale == "log"
@@ -187,6 +203,7 @@ class _Run:
             learning_starts=self._warmup_steps() * env.num_envs,
             train_freq=1,
             gradient_steps=settings.updates_per_rollout,
+            policy_waits=0 if settings.origin is None else round(_WAITS * settings.updates),
             seed=seed,
             device=settings.device,
             policy_kwargs={
@@ -197,6 +214,9 @@ class _Run:
             },
         )
         model.set_logger(Logger(folder=None, output_formats=[]))
+        origin = _origin(settings, self.task)
+        if origin is not None:
+            model.begin_with(origin.weights, origin.biases, _SPREAD)
         return model
 
     def _yardsticks(self) -> tuple[Yardstick, Yardstick]:

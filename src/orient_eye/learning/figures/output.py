@@ -61,12 +61,12 @@ def figure_5_1(policy: Policy, yardstick: Yardstick, table: Yardstick | None = N
 
 def figure_5_25(policy: Policy, yardstick: Yardstick) -> Figure:
     """Energy of the command against saccade size, beside the optimum's (thesis Figure 5.25)."""
-    task = yardstick.task
+    task = yardstick.task.plain
     figure = Figure(figsize=(7.5, 5), layout="constrained")
     axes = figure.subplots()
     best = task.actions.command(yardstick.start, yardstick.target, yardstick.optimum.action).energy()
     axes.plot(yardstick.size_deg, best, ".", color=BEST, ms=6, label="searched optimum")
-    every = Saccades.every_size(task, policy)
+    every = Saccades.every_size(yardstick.task, policy)
     energy = task.actions.command(every.start, every.target, every.action).energy()
     mean_and_range(axes, every.size_deg, energy, LEARNED, "policy")
     size_axis(axes, task)
@@ -100,7 +100,7 @@ class _Output:
 
     @classmethod
     def of(cls, policy: Policy, yardstick: Yardstick) -> "_Output":
-        task, every = yardstick.task, Saccades.every_size(yardstick.task, policy)
+        task, every = yardstick.task.plain, Saccades.every_size(yardstick.task, policy)
         best = _quantities(task, yardstick.start, yardstick.target, yardstick.optimum.action)
         return cls(yardstick, best, every, _quantities(task, every.start, every.target, every.action))
 
@@ -110,7 +110,7 @@ class _Output:
 
     def draw(self, axes: "Axes", key: Key) -> None:
         """One quantity against the size."""
-        size, task = self.yardstick.size_deg, self.yardstick.task
+        size, task = self.yardstick.size_deg, self.yardstick.task.plain
         shown = size >= SIZES_DEG[0]  # where there is nothing to do, B, k0 and C may be anything
         axes.plot(size[shown], self.best[key][shown], ".", color=BEST, ms=6, label="searched optimum")
         values = self.ours[key]
@@ -130,7 +130,7 @@ class _Output:
 
 def _draw_symmetric(axes: "Axes", key: Key, policy: Policy, table: Yardstick) -> None:
     """The same of saccades around straight ahead only."""
-    task, shown = table.task, Saccades.symmetric(table.task, policy, SIZES_DEG)
+    task, shown = table.task.plain, Saccades.symmetric(table.task, policy, SIZES_DEG)
     best = _quantities(task, table.start, table.target, table.optimum.action)
     ours = _quantities(task, shown.start, shown.target, shown.action)
     axes.plot(shown.size_deg, ours[key], "--", color=LEARNED, lw=1.2, label="policy, symmetric")

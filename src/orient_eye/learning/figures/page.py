@@ -7,7 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orient_eye.figures import save, tidy
+from orient_eye.learning.directions import in_all_directions
 from orient_eye.learning.evaluation import Yardstick
+from orient_eye.learning.figures.gaze import gaze_page
 from orient_eye.learning.figures.main_sequence import draw_main_sequence
 from orient_eye.learning.figures.output import draw_output
 from orient_eye.learning.figures.saccades import LEARNED, SHOWN_DEG, Saccades, draw_speed, draw_turned
@@ -33,8 +35,13 @@ def draw_learning(metrics: Path, path: Path) -> Path:
 
 
 def draw_policy(policy: Policy, yardstick: Yardstick, path: Path) -> Path:
-    """One page: policy output beside the searched optimum (5.1), saccades (5.2), main sequence (5.4)."""
+    """One page: policy output beside the searched optimum (5.1), saccades (5.2), main sequence (5.4).
+
+    In all directions: paths and components of the gaze, main sequence, Listing's plane, torsion, reward gap.
+    """
     task = yardstick.task
+    if in_all_directions(task):
+        return save(gaze_page(policy, yardstick), path)
     figure = Figure(figsize=(15, 8), layout="constrained")
     axes = figure.subplots(2, 3)
     draw_output(axes[0], policy, yardstick)

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.figures import DATA, MODEL, OTHER, tidy
+from orient_eye.learning.directions import angles_toward, size_deg, toward
 from orient_eye.learning.policy import Policy
+from orient_eye.movement.measures import Measures
+from orient_eye.movement.oblique import seen_from
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.state import State
 from orient_eye.task.saccade import Outcome, SaccadeTask
@@ -33,7 +36,7 @@ class Saccades:
     """Saccades of a policy.
 
     Attributes:
-        task: on which they are made.
+        task: on which they are made, its actions told without regard to the saccade.
         start: of the eyes.
         target: desired orientations, (saccades, 4).
         action: of the policy, in units, (saccades, numbers).
@@ -45,10 +48,15 @@ class Saccades:
     action: Array
 
     @classmethod
+    def of(cls, task: SaccadeTask, policy: Policy, start: State, target: Array) -> "Saccades":
+        """From starts to target orientations (saccades, 4)."""
+        action = task.actions.as_plain(start, target, policy.act(start.orientation, target))
+        return cls(task.plain, start, target, action)
+
+    @classmethod
     def between(cls, task: SaccadeTask, policy: Policy, angles: tuple[Array, Array]) -> "Saccades":
         """Between directions told by the angles of the task's targets, each (saccades, angles)."""
-        start, target = saccades(task.targets, *angles)
-        return cls(task, start, target, policy.act(start.orientation, target))
+        return cls.of(task, policy, *saccades(task.targets, *angles))
 
     @classmethod
     def symmetric(cls, task: SaccadeTask, policy: Policy, size_deg: Array) -> "Saccades":
@@ -60,10 +68,21 @@ class Saccades:
         """Of every size, from starting points all over the range, both ways."""
         return cls.between(task, policy, task.targets.of_sizes(SIZES_DEG, _STARTS))
 
+    def components_alone(self, task: SaccadeTask, policy: Policy) -> tuple["Saccades", "Saccades"]:
+        """A policy's saccades along the horizontal part of their ways alone, and along the vertical part."""
+        begin = rotations.gaze(self.start.orientation)
+        way = seen_from(rotations.gaze(self.target), begin)
+
+        def along(part: Array) -> "Saccades":
+            target = task.targets.orientation(angles_toward(task.targets, toward(way * part, begin)))
+            return Saccades.of(task, policy, self.start, target)
+
+        return along(np.array([1.0, 0.0])), along(np.array([0.0, 1.0]))
+
     @cached_property
     def size_deg(self) -> Array:
-        """Angle from start to target, (saccades,)."""
-        return rotations.angle_between(self.start.orientation, self.target).round(6)
+        """Angle from start to target, or where saccades go in all directions that of their gaze, (saccades,)."""
+        return size_deg(self.task, self.start.orientation, self.target).round(6)
 
     @cached_property
     def outcome(self) -> Outcome:
@@ -74,6 +93,11 @@ class Saccades:
     def trajectory(self) -> Trajectory:
         """The movements over time."""
         return self.outcome.movement.trajectory()
+
+    @cached_property
+    def of_gaze(self) -> Measures:
+        """Measures of their gaze."""
+        return self.outcome.movement.measure(self.task.band, "gaze")
 
 
 def turned(trajectory: Trajectory) -> Array:

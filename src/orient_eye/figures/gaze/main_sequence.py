@@ -1,0 +1,106 @@
+"""Main sequence by direction."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from orient_eye.figures import tidy
+from orient_eye.figures.gaze.human import draw_human, draw_human_duration
+from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL
+from orient_eye.movement.measures import Measures
+from orient_eye.movement.oblique import end_of_shift
+from orient_eye.movement.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+_AXIAL_DEG = 15.0  # from an axis: nearer to it a saccade is no oblique one
+_LEAST = 3  # saccades through which a line is drawn
+
+
+def saturation(amplitude_deg: Array, peak_velocity_deg_s: Array) -> tuple[float, float]:
+    """V0 [deg/s] and c [deg] of peak velocity = V0 (1 - exp(-amplitude / c)), by least squares.
+
+    c is looked for up to 1000 times the largest amplitude, where the curve is a line; V0 follows from it.
+    """
+
+    def fit(log_c: float) -> tuple[float, float]:
+        shape = -np.expm1(-amplitude_deg / np.exp(log_c))
+        V0 = float(shape @ peak_velocity_deg_s / (shape @ shape))
+        return V0, float(((peak_velocity_deg_s - V0 * shape) ** 2).sum())
+
+    bounds = np.log([amplitude_deg.min() / 100, 1000 * amplitude_deg.max()])
+    log_c = minimize_scalar(lambda x: fit(x)[1], bounds=bounds, method="bounded", options={"xatol": 1e-9}).x
+    return fit(log_c)[0], float(np.exp(log_c))
+
+
+def main_sequence(trajectory: Trajectory, measures: Measures) -> Figure:
+    """Peak velocity and duration against amplitude, apart by direction, beside people.
+
+    Within 15 deg of the horizontal or the vertical a saccade counts as one of that direction. A line is drawn through
+    three saccades of a direction and more. Where peak velocity does not saturate among them (c beyond the largest), V0
+    means nothing, and the slope V0 / c is written.
+
+    A human saccade ends where its speed falls below a threshold, ours where the gaze stays within the settling band,
+    which is later.
+
+    Args:
+        trajectory: of the saccades.
+        measures: of their gaze.
+    """
+    figure = Figure(figsize=(12.5, 6.2), layout="constrained")
+    peak, duration = figure.subplots(1, 2)
+    end = end_of_shift(trajectory, measures)
+    usable = np.isfinite(end).all(axis=1) & measures.settled & (measures.amplitude_deg > 0)
+    angle = np.rad2deg(np.arctan2(np.abs(end[:, 1]), np.abs(end[:, 0])))
+    horizontal, vertical = angle <= _AXIAL_DEG, angle >= 90 - _AXIAL_DEG
+    directions: tuple[tuple[str, dict[str, Any], NDArray[np.bool_]], ...] = (
+        ("horizontal", {"color": HORIZONTAL, "marker": "o"}, horizontal),
+        ("vertical", {"color": VERTICAL, "marker": "^"}, vertical),
+        ("oblique", {"color": OBLIQUE, "marker": "x"}, ~(horizontal | vertical)),
+    )
+    largest = float(np.max(measures.amplitude_deg, where=usable, initial=5.0))
+    for name, style, chosen in directions:
+        some = measures[chosen & usable]
+        _draw_peak(peak, some, name, style)
+        _draw_duration(duration, some, name, style)
+    draw_human(peak, "peak_velocity", "peak_velocity_vertical")
+    draw_human(duration, "duration")
+    draw_human_duration(duration, largest)
+    peak.set(ylabel="peak velocity of the gaze [deg/s]")
+    duration.set(ylabel="duration [ms]")
+    for axes in (peak, duration):
+        axes.set(xlabel="amplitude [deg]", xlim=(0, 1.04 * largest))
+        axes.set_ylim(bottom=0)
+        axes.legend(frameon=False, fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
+        tidy(axes)
+    figure.suptitle("Main sequence by direction")
+    return figure
+
+
+def _draw_peak(axes: "Axes", some: Measures, name: str, style: dict[str, Any]) -> None:
+    amplitude, peak = some.amplitude_deg, some.peak_velocity_deg_s
+    if len(peak) >= _LEAST:
+        V0, c = saturation(amplitude, peak)
+        reached = c < amplitude.max()
+        told = f"$V_0$ = {V0:.0f} deg/s, c = {c:.1f} deg" if reached else f"{V0 / c:.1f} deg/s a deg, no saturation"
+        size = np.linspace(0, amplitude.max(), 100)
+        axes.plot(size, -V0 * np.expm1(-size / c), color=style["color"], lw=1.2)
+        name = f"{name}: {told}"
+    if len(peak):
+        axes.plot(amplitude, peak, ls="", mfc="none", ms=5, label=name, **style)
+
+
+def _draw_duration(axes: "Axes", some: Measures, name: str, style: dict[str, Any]) -> None:
+    amplitude, duration = some.amplitude_deg, 1e3 * some.settling_time_s
+    if len(duration) >= _LEAST:
+        slope, intercept = np.polyfit(amplitude, duration, 1)
+        size = np.array([0, amplitude.max()])
+        axes.plot(size, intercept + slope * size, color=style["color"], lw=1.2)
+        name = f"{name}: {intercept:.0f} ms + {slope:.1f} ms/deg"
+    if len(duration):
+        axes.plot(amplitude, duration, ls="", mfc="none", ms=5, label=name, **style)
