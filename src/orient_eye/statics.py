@@ -10,11 +10,12 @@ All within the motors' working ranges. Left and up are those of `orient_eye.move
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from orient_eye import listing, rotations
 from orient_eye.errors import InputError
 from orient_eye.motor import names
+from orient_eye.movement.oblique import toward
 from orient_eye.plants import Plant
 from orient_eye.plants.fixation import fixate
 
@@ -115,19 +116,6 @@ def degrees_per_motor(plant: Plant) -> Array:
     moved = _TURN * np.eye(len(plant.motors))
     ahead, behind = (rotations.rotation(plant.rest(side * moved)) for side in (1, -1))
     return np.asarray((ahead * behind.inv()).as_rotvec(degrees=True) / (2 * _TURN))
-
-
-def toward(shift: ArrayLike, origin: ArrayLike = _AHEAD) -> Array:
-    """Directions (..., 3) so far to the left and up [deg] (..., 2) of an origin (..., 3).
-
-    The inverse of `orient_eye.movement.oblique.seen_from`.
-    """
-    shift = np.asarray(shift, dtype=float)
-    away = np.deg2rad(np.linalg.norm(shift, axis=-1, keepdims=True))
-    local = np.concatenate([np.cos(away), np.sinc(away / np.pi) * np.deg2rad(shift)], axis=-1)
-    origin = np.broadcast_to(np.asarray(origin, dtype=float), local.shape)
-    turned = rotations.rotation(listing.with_torsion(origin, 0.0).reshape(-1, 4))
-    return np.asarray(turned.apply(local.reshape(-1, 3)).reshape(local.shape))
 
 
 def cone(limit_deg: float) -> Array:

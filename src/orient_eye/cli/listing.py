@@ -297,7 +297,8 @@ def _corners(plant: "Plant", limit: float) -> "Held":
     """Straight ahead, and eight directions around it."""
     import numpy as np
 
-    from orient_eye.statics import Held, toward
+    from orient_eye.movement.oblique import toward
+    from orient_eye.statics import Held
 
     around = np.pi / 4 * np.arange(8)
     return Held.of(

@@ -25,8 +25,8 @@ class Optimum:
     """Search the best action for a saccade: B, D and k0 with the largest reward, on any plant.
 
     Simplices from the best of a sample over the whole box of actions; of several motors' numbers, evolution strategies.
-    What was found is kept in the user's cache and remembered when the same saccades are asked for again. --check searches once more by another program and exits
-    with 1 when that finds something better by more than 0.1 %.
+    What was found is kept in the user's cache and remembered when the same saccades are asked for again. --check
+    searches once more by another program and exits with 1 when that finds something better by more than 0.1 %.
 
     $ orient-eye optimum --start 0 --target 30
 

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye import listing, rotations
-from orient_eye.movement.oblique import seen_from
+from orient_eye.movement.oblique import seen_from, toward
 from orient_eye.task.saccade import SaccadeTask
 from orient_eye.task.targets import Targets
 
 Array = NDArray[np.float64]
-_AHEAD = np.array([1.0, 0.0, 0.0])
 _OBLIQUE = np.tan(np.deg2rad(22.5))  # of the larger component, from which on the smaller one is named
 
 
@@ -27,19 +26,6 @@ def size_deg(task: SaccadeTask, start: Array, target: Array) -> Array:
     if in_all_directions(task):
         return rotations.angle_between_directions(rotations.gaze(start), rotations.gaze(target))
     return rotations.angle_between(start, target)
-
-
-def toward(shift: ArrayLike, origin: ArrayLike = _AHEAD) -> Array:
-    """Directions (n, 3) so far to the left and up of others; the inverse of `orient_eye.movement.oblique.seen_from`.
-
-    Args:
-        shift: left, up [deg], (n, 2).
-        origin: unit vectors (n, 3), or one (3,).
-    """
-    beside = np.deg2rad(np.asarray(shift, dtype=float))
-    away = np.linalg.norm(beside, axis=-1, keepdims=True)
-    ahead = np.concatenate([np.cos(away), np.sinc(away / np.pi) * beside], axis=-1)
-    return np.asarray(rotations.rotation(listing.with_torsion(origin, 0.0)).apply(ahead))
 
 
 def angles_toward(targets: Targets, direction: Array) -> Array:

@@ -26,11 +26,12 @@ from orient_eye.movement.oblique import (
     end_of_shift,
     path_deviation,
     torsion_blip,
+    toward,
 )
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants.fixation import Fixations
 from orient_eye.state import State
-from orient_eye.statics import degrees_per_motor, toward
+from orient_eye.statics import degrees_per_motor
 from orient_eye.task.residual_actions import ResidualActions
 from orient_eye.task.saccade import Outcome, SaccadeTask
 from orient_eye.task.table import outcome_columns

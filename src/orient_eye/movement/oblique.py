@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from orient_eye import rotations
 from orient_eye.constants import BAND
-from orient_eye.listing import torsion
+from orient_eye.listing import torsion, with_torsion
 from orient_eye.movement.measures import Measures, measure_angle
 from orient_eye.movement.trajectory import Trajectory
 
@@ -37,6 +37,19 @@ def seen_from(direction: ArrayLike, origin: ArrayLike = _AHEAD) -> Array:
     """
     beside, along = _parts(np.asarray(direction, dtype=float), np.asarray(origin, dtype=float))
     return np.asarray(np.rad2deg(beside * _stretch(beside, along)))
+
+
+def toward(shift: ArrayLike, origin: ArrayLike = _AHEAD) -> Array:
+    """Directions (..., 3) so far to the left and up [deg] (..., 2) of an origin (..., 3).
+
+    The inverse of `seen_from`.
+    """
+    shift = np.asarray(shift, dtype=float)
+    away = np.deg2rad(np.linalg.norm(shift, axis=-1, keepdims=True))
+    local = np.concatenate([np.cos(away), np.sinc(away / np.pi) * np.deg2rad(shift)], axis=-1)
+    origin = np.broadcast_to(np.asarray(origin, dtype=float), local.shape)
+    turned = rotations.rotation(with_torsion(origin, 0.0).reshape(-1, 4))
+    return np.asarray(turned.apply(local.reshape(-1, 3)).reshape(local.shape))
 
 
 def gaze_components(trajectory: Trajectory) -> Array:
