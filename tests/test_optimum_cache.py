@@ -97,7 +97,7 @@ def test_search_is_reproducible(tmp_path: Path) -> None:
         lambda: task("2-varying", speed_limit=5000.0),
         lambda: task(weights=WEIGHTS | {"overshoot": 1e8}),
         lambda: task(weights=WEIGHTS | {"accuracy": 2.66e7 * (1 + 1e-12)}),
-        lambda: task(judge="gaze"),
+        lambda: task(judge="gaze", weights=WEIGHTS | {"force": 0.0}),
         lambda: task(band=0.02),
         lambda: task(plant=LinearPlant(Surrogate(1.5, 17.5, eye="thesis"))),
         lambda: task(plant=LinearPlant(Surrogate(1.4758, 17.6, eye="thesis"))),
@@ -324,7 +324,7 @@ def test_two_searches_agree_in_nine_dimensions() -> None:
     start, target = own.targets.draw(1, np.random.default_rng(2021))
     assert len(own.actions.numbers) == 9
     best = searched_optimum(own, start, target)
-    assert best.evaluations < 1300
+    assert best.evaluations < 7000
     _, reward = second_search(own, start, target)
     assert reward == pytest.approx(best.reward[0], rel=1e-3)
 

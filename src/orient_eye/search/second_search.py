@@ -11,8 +11,12 @@ from orient_eye.task.saccade import SaccadeTask
 
 Array = NDArray[np.float64]
 _NUMBERS = 3  # of the thesis' action
-AGREEMENT = 1e-3
-"""Of |R*|: as far as the second search may be better before the first counts as wrong."""
+_AGREEMENT, _OF_MANY = 1e-3, 5e-3
+
+
+def agreement(task: SaccadeTask) -> float:
+    """Of |R*|: as far as the second search may be better before the first counts as wrong; more of many numbers."""
+    return _AGREEMENT if len(task.actions.plain.numbers) <= _NUMBERS else _OF_MANY
 
 
 def second_search(task: SaccadeTask, start: State, target: Array) -> tuple[Array, float]:
