@@ -26,7 +26,8 @@ class Optimum:
 
     Simplices from the best of a sample over the whole box of actions; of several motors' numbers, evolution strategies.
     What was found is kept in the user's cache and remembered when the same saccades are asked for again. --check
-    searches once more by another program and exits with 1 when that finds something better by more than 0.1 % (0.5 % where several motors are driven).
+    searches once more by another program and exits with 1 when that finds something better by more than 0.1 % (0.5 %
+    where several motors are driven).
 
     $ orient-eye optimum --start 0 --target 30
 

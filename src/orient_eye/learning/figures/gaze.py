@@ -12,12 +12,19 @@ from orient_eye.figures import tidy
 from orient_eye.figures.gaze.human import draw_human
 from orient_eye.figures.gaze.paths import draw_paths
 from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL, colours, end_ms, way
-from orient_eye.learning.directions import angles_toward, opposite, toward
+from orient_eye.learning.directions import angles_toward, opposite
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.figures.saccades import BEST, LEARNED, Saccades, titled
 from orient_eye.learning.policy import Policy
 from orient_eye.listing import fit_plane, rotation_vectors
-from orient_eye.movement.oblique import end_of_shift, seen_from, shift_velocity, torsion_blip, transient_torsion
+from orient_eye.movement.oblique import (
+    end_of_shift,
+    seen_from,
+    shift_velocity,
+    torsion_blip,
+    toward,
+    transient_torsion,
+)
 from orient_eye.task.saccade import SaccadeTask
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.figures import DATA, MODEL, OTHER, tidy
-from orient_eye.learning.directions import angles_toward, size_deg, toward
+from orient_eye.learning.directions import angles_toward, size_deg
 from orient_eye.learning.policy import Policy
 from orient_eye.movement.measures import Measures
-from orient_eye.movement.oblique import seen_from
+from orient_eye.movement.oblique import seen_from, toward
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.state import State
 from orient_eye.task.saccade import Outcome, SaccadeTask
