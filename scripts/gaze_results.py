@@ -12,6 +12,7 @@ Every part prints its table; `result.json` in the folder has the numbers.
 """
 
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -29,10 +30,12 @@ from orient_eye.learning.policy import Policy
 from orient_eye.learning.sequences import drawn, ficks_starts, listing_numbers, sequence, stretching
 from orient_eye.plants import make_plant
 from orient_eye.progress import progress_bar
+from orient_eye.search.optimum_file import NAME as OPTIMUM
 from orient_eye.task.gaze_targets import GazeTargets
 from orient_eye.task.saccade import SaccadeTask
 
 Part = Literal["learn", "judge", "surrogates", "fick"]
+ROOT = Path(__file__).resolve().parents[1]
 START_DEG, PAIRS, SACCADES, SEED = 20.0, 100, 200, 7
 FICK_WEIGHTS = {"force": 3e5, "no force": 0.0}
 
@@ -51,19 +54,29 @@ class Results:
     """Of every run; the usual number unless given."""
     pairs: int = PAIRS
     """Saccades on which policies are judged."""
+    ship: bool = False
+    """Copy the best policy of the compiled eye and that of the linear one into models/policies."""
 
 
 def main(options: Results) -> None:
     """Do the parts in their order."""
-    found: dict[str, Any] = {}
     for part in options.parts:
-        found[part] = {"learn": learn, "judge": judge, "surrogates": surrogates, "fick": fick}[part](options)
-        before = (
-            json.loads((options.folder / "result.json").read_text())
-            if (options.folder / "result.json").exists()
-            else {}
-        )
-        write_text(options.folder / "result.json", json.dumps({**before, **found}, indent=1) + "\n")
+        found = {"learn": learn, "judge": judge, "surrogates": surrogates, "fick": fick}[part](options)
+        path = options.folder / "result.json"
+        before = json.loads(path.read_text()) if path.exists() else {}
+        write_text(path, json.dumps({**before, part: found}, indent=1) + "\n")
+    if options.ship:
+        ship(options)
+
+
+def ship(options: Results) -> None:
+    """Policies with the optimum of their evaluation saccades."""
+    seeds = [options.folder / f"tavares-gaze-seed{seed}" for seed in options.seeds]
+    best = min(seeds, key=lambda run: json.loads((run / "result.json").read_text())["gap_mean"])
+    for name, run in (("tavares-gaze", best), ("modal-gaze", options.folder / "modal-gaze")):
+        goal = Policy.load(run).save(ROOT / "models" / "policies" / name).parent
+        shutil.copy(run / OPTIMUM, goal / OPTIMUM)
+        print(f"{goal}: from {run.name}", file=sys.stderr)
 
 
 def train(options: Results, name: str, *told: str) -> Path:
@@ -159,7 +172,7 @@ def fick(options: Results) -> list[dict[str, Any]]:
         for name, weight in FICK_WEIGHTS.items():
             weights = ["4.08e7", "1", "5.53e5", "5e6", str(weight)]
             told = ("--plant", "tavares", "--eye", eye, "--targets", "gaze", "--torsion", "fick", "--weights", *weights)
-            out = train(options, f"fick-{eye}-{name.replace(' ', '-')}", *told, "--evaluation-pairs", "8")
+            out = train(options, f"fick-{eye}-{name.replace(' ', '-')}", *told, "--evaluation-pairs", "2")
             policy = Policy.load(out)
             task = policy.task(make_plant("mujoco", eye=eye))
             for where in (False, True):
