@@ -30,6 +30,8 @@ def read_motors(path: str | Path, model: mujoco.MjModel) -> NDArray[np.float64]:
     wanted = step_s * np.arange(round((time[-1] + REST_S) / step_s) + 1)
     motors = np.zeros((len(wanted), model.nu))
     for name in set(names) - {"t_s"}:
+        if not name.endswith("_deg"):
+            raise SystemExit(f"column {name}: this plays positions in deg; a rig's command goes to orient-eye simulate")
         motor = model.actuator(name.replace("tau", "motor").removesuffix("_deg")).id
         motors[:, motor] = np.deg2rad(np.interp(wanted, time, table[:, names.index(name)]))
     return motors

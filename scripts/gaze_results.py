@@ -12,11 +12,10 @@ Every part prints its table; `result.json` in the folder has the numbers.
 """
 
 import json
-import shutil
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,13 +23,18 @@ import numpy as np
 import tyro
 
 from orient_eye.files import write_text
-from orient_eye.learning.evaluation import Yardstick
+from orient_eye.learning.evaluation import (
+    Yardstick,
+    amplitude_table,
+    carry_optimum,
+    evaluation_saccades,
+    gap_summary,
+)
 from orient_eye.learning.judged import measure_policy
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.sequences import drawn, ficks_starts, listing_numbers, sequence, stretching
 from orient_eye.plants import make_plant
 from orient_eye.progress import progress_bar
-from orient_eye.search.optimum_file import NAME as OPTIMUM
 from orient_eye.task.gaze_targets import GazeTargets
 from orient_eye.task.saccade import SaccadeTask
 
@@ -74,9 +78,13 @@ def ship(options: Results) -> None:
     seeds = [options.folder / f"tavares-gaze-seed{seed}" for seed in options.seeds]
     best = min(seeds, key=lambda run: json.loads((run / "result.json").read_text())["gap_mean"])
     for name, run in (("tavares-gaze", best), ("modal-gaze", options.folder / "modal-gaze")):
-        goal = Policy.load(run).save(ROOT / "models" / "policies" / name).parent
-        shutil.copy(run / OPTIMUM, goal / OPTIMUM)
-        print(f"{goal}: from {run.name}", file=sys.stderr)
+        policy = Policy.load(run)
+        pairs, rows = evaluation_saccades(policy.task(), policy.manifest["result"]["pairs"])  # as the search is today
+        found = {**gap_summary(pairs, *pairs.perform(policy.act)), "table": amplitude_table(rows, policy.act)}
+        told = {**policy.manifest, "result": {**policy.manifest["result"], **found}}
+        goal = replace(policy, manifest=told).save(ROOT / "models" / "policies" / name).parent
+        carry_optimum(pairs, rows, goal)
+        print(f"{goal}: from {run.name}, gap {found['gap_mean']:.4f}", file=sys.stderr)
 
 
 def train(options: Results, name: str, *told: str) -> Path:
@@ -128,10 +136,8 @@ def judged(policy: Policy, pairs: int, eye: str = "thesis") -> dict[str, Any]:
     start, target = near.draw(pairs, random)[0], own.targets.draw(pairs, random)[1]
     with progress_bar("searching the optimum", quiet=False) as advance:
         best = Yardstick.search(own, start, target, advance)
-    mine = policy.task(own.plant)
-    yardstick = Yardstick(
-        SaccadeTask(own.plant, mine.actions, own.targets, own.weights, own.judge), start, target, best.optimum
-    )
+    mine = replace(own, actions=policy.task(own.plant).actions)
+    yardstick = Yardstick(mine, start, target, best.optimum)
     numbers, _ = measure_policy(policy, yardstick, yardstick[:6])
     return {name: value for name, value in numbers.items() if name not in ("numbers", "table")}
 

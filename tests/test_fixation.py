@@ -14,8 +14,9 @@ from orient_eye.listing import directions, ficks_torsion, fit_plane, with_torsio
 from orient_eye.motor import names
 from orient_eye.plants import Plant, make_plant
 from orient_eye.plants.elastic import ElasticPlant
-from orient_eye.plants.fixation import Fixations, fixate, torsion_range
+from orient_eye.plants.fixation import Fixations, fixate
 from orient_eye.rotations import angle_between, angle_between_directions, gaze
+from orient_eye.statics import Held
 
 Array = NDArray[np.float64]
 ALL = ("motor1", "motor2", "motor3")
@@ -168,13 +169,13 @@ def test_a_plant_without_elastics_is_held_without_torsion() -> None:
 )
 def test_the_torsion_that_motors_reach(name: str, gazes: Array, expected: Array) -> None:
     """Of an independent program, to half a degree; which of the two oblique ends is which depends on the side."""
-    found = torsion_range(make_plant("tavares", eye=name), directions(*np.array(gazes, float).T))
+    found = Held.of(make_plant("tavares", eye=name), directions(*np.array(gazes, float).T)).range
     oblique = found[2] if abs(found[2, 0] - expected[2][0]) < 1 else -found[2, ::-1]
     np.testing.assert_allclose(np.vstack([found[:2], oblique]), expected, atol=0.51)
 
 
 def test_a_direction_out_of_reach_has_no_torsion(eye: ElasticPlant) -> None:
-    assert np.isnan(torsion_range(eye, directions([85.0], [0.0]), 1.0)).all()
+    assert np.isnan(Held.of(eye, directions([85.0], [0.0])).range).all()
     assert np.isnan(np.concatenate([each.ravel() for each in fixate(eye, directions([85.0], [0.0]))[1:]])).all()
 
 

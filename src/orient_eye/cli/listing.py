@@ -230,7 +230,7 @@ class Listing:
             "out": str(run.path),
             "policy": name,
             "plant": task.plant.name,
-            "task": task.identity(),
+            "task": longer.identity(),
             "differs_from_training": differences,
             "start": self.start,
             **made_by.listing_numbers(made),
@@ -404,9 +404,13 @@ def _say_sequences(result: dict[str, Any]) -> None:
     apart = ""
     if beside is not None:
         apart = f"; beside the torsion of the least force {beside['mean']:+.2f} deg, sd {beside['sd']:.2f}"
+    usual = result["usual"]
+    alone = (
+        "" if usual is None else f"; by the usual command alone sd {usual['sd_deg']:.2f}, twist {usual['twist']:+.2f}"
+    )
     say(
-        f"Emerged from it: ends within sd {ends['sd_deg']:.2f} deg of a plane, twist {ends['twist']:+.2f} (Listing 0, "
-        f"Fick -1){apart}."
+        f"What came of it: ends within sd {ends['sd_deg']:.2f} deg of a plane, twist {ends['twist']:+.2f} (Listing 0, "
+        f"Fick -1){alone}{apart}. Only what differs from the usual command has emerged."
     )
 
 

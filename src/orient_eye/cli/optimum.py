@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from orient_eye.cli.problem import Problem
-from orient_eye.cli.saccades import Saccades
+from orient_eye.cli.saccades import Saccades, refuse_no_saccade
 
 if TYPE_CHECKING:
     import numpy as np
@@ -66,9 +66,10 @@ class Optimum:
         case = self.problem.case(self.case)
         plant, targets = self.problem.made()
         start, target = saccades(targets, *self.saccades.angles(targets))
-        _refuse_no_saccade(start, target)
-        task = self.problem.task(plant, targets, case, self.weights).plain
-        best, remembered = self._search(task, start, target)
+        refuse_no_saccade(start, target)
+        own = self.problem.task(plant, targets, case, self.weights)
+        best, remembered = self._search(own, start, target)
+        task = own.plain
         outcome = task.perform(start, best.action, target)
         rows = with_peaks(task, outcome, outcome_rows(task, start, target, best.action, outcome))
         result: dict[str, Any] = {
@@ -135,11 +136,3 @@ class Optimum:
             "check_largest_gain": max(*gains, 0.0),
             "check_largest_loss": max(*(-g for g in gains), 0.0),
         }
-
-
-def _refuse_no_saccade(start: "State", target: "Array") -> None:
-    from orient_eye.errors import InputError
-    from orient_eye.rotations import angle_between
-
-    for i in (angle_between(start.orientation, target) == 0).nonzero()[0]:
-        raise InputError(f"saccade {i + 1} starts at its target: a saccade goes from one direction to another")

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from orient_eye.state import State
     from orient_eye.task.targets import Targets
 
     Array = NDArray[np.float64]
@@ -26,11 +27,13 @@ class Saccades:
     """Which saccades, told by the angles of the task's targets."""
 
     start: Annotated[tuple[float, ...] | None, _angles("(default: straight ahead)")] = None
-    """Direction in which the saccade begins, deg: one number for horizontal targets, the yaw, positive to the left."""
+    """Direction in which the saccade begins, deg: one number for horizontal targets, the yaw, positive to the left; for
+    gaze targets two, yaw and pitch, positive down."""
     target: Annotated[tuple[float, ...] | None, _angles("(required without --pairs)")] = None
-    """Direction in which it should end, deg."""
+    """Direction in which it should end, deg, told the same way."""
     pairs: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(optional)")] = None
-    """Many saccades instead: a CSV file with the columns start_yaw_deg and target_yaw_deg for horizontal targets."""
+    """Many saccades instead: a CSV file with the columns start_yaw_deg and target_yaw_deg, for gaze targets
+    start_pitch_deg and target_pitch_deg too."""
 
     def angles(self, targets: "Targets", *, drawn: bool = False) -> "tuple[Array, Array]":
         """Angles [deg] (saccades, angles) of starts and targets.
@@ -85,6 +88,19 @@ def read_pairs(path: Path, angles: tuple[str, ...]) -> "tuple[Array, Array]":
     names = [tuple(f"{what}_{angle}" for angle in angles) for what in ("start", "target")]
     table = read_table(path, ",".join(names[0] + names[1]))
     return table.stack(names[0]), table.stack(names[1])
+
+
+def refuse_no_saccade(start: "State", target: "Array") -> None:
+    """Refuse saccades (saccades,) that go nowhere.
+
+    Raises:
+        InputError: says which.
+    """
+    from orient_eye.errors import InputError
+    from orient_eye.rotations import angle_between
+
+    for i in (angle_between(start.orientation, target) == 0).nonzero()[0]:
+        raise InputError(f"saccade {i + 1} starts at its target: a saccade goes from one direction to another")
 
 
 def _told(angles: tuple[str, ...]) -> str:

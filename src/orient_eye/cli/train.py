@@ -88,7 +88,8 @@ def _say_task(task: "SaccadeTask") -> None:
     say(f"actions: {', '.join(told)}")
     weights = ", ".join(f"{name} {value:.3g}" for name, value in task.weights.items())
     say(f"weights of the reward: {weights}; {task.weights_from}")
-    say(compared_with_thesis(task))
+    if task.judge == "orientation":
+        say(compared_with_thesis(task))
 
 
 def _say_robust(result: dict[str, Any]) -> None:

@@ -104,7 +104,7 @@ class SaccadeBatch:
                 `start` and `target`, orientations w, x, y, z; each for one saccade, or one for each.
 
         Raises:
-            InputError: unknown options, or a start the eye cannot hold.
+            InputError: unknown options, or a start or target that the eye cannot hold.
         """
         start, target = self.task.targets.draw(count, random)
         if options:
@@ -114,6 +114,7 @@ class SaccadeBatch:
     def _chosen(self, count: int, start: State, target: Array, options: dict[str, Any]) -> tuple[State, Array]:
         targets, orientations = self.task.targets, [start.orientation, target]
         for k, name in enumerate(("start", "target")):
+            before = len(options)
             if name in options:
                 orientations[k] = _numbers(name, options.pop(name), (count, 4))
             elif any(f"{name}_{angle}" in options for angle in targets.angles):
@@ -123,6 +124,8 @@ class SaccadeBatch:
                     if key in options:
                         told[:, i] = _numbers(key, options.pop(key), (count,))
                 orientations[k] = targets.orientation(told)
+            if len(options) < before:
+                targets.check(targets.angles_of(orientations[k]), name)
         if options:
             known = [f"{name}_{angle}" for name in ("start", "target") for angle in targets.angles]
             raise InputError(

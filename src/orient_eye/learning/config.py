@@ -9,6 +9,7 @@ Their docstrings are the help of `orient-eye train`.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
@@ -198,12 +199,13 @@ class TrainConfig:
             "evaluation_pairs": task.plant.evaluation_pairs,
             **PRESETS[self.preset],
             **(task.targets.learning if self.preset == "ours" else {}),
-            **({} if self.origin is None else FINE_TUNING),
+            **(FINE_TUNING if self.origin is not None and self.preset == "ours" else {}),
             **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},
         }
         if self.updates_per_rollout is None and _whole(values["updates"]):
             values["updates_per_rollout"] = math.gcd(values["updates"], values["updates_per_rollout"])
-        values["origin"] = self.origin
+        path = None if self.origin is None else Path(self.origin)  # else the name of a shipped policy
+        values["origin"] = str(path.resolve()) if path is not None and path.exists() else self.origin
         values["robust"] = _intervals(task) if self.robust else {}
         return TrainSettings(task=task.identity(), weights_from=task.weights_from, **values)
 

@@ -78,14 +78,14 @@ def stretching(task: SaccadeTask, policy: Policy, made: Saccades) -> dict[str, f
         policy: whose saccades they are.
         made: its saccades.
     """
-    took, found = component_durations(made.trajectory, made.of_gaze), {}
+    took, found = component_durations(made.trajectory, made.of_gaze, task.band), {}
     oblique = np.isfinite(took).all(axis=1)
     for k, (name, alone) in enumerate(
         zip(("horizontal", "vertical"), made.components_alone(task, policy), strict=True)
     ):
         gaze = rotations.gaze(alone.target)
         inside = rotations.angle_between_directions(gaze, [1.0, 0.0, 0.0]) <= task.targets.limit_deg
-        took_alone, told = component_durations(alone.trajectory, alone.of_gaze), oblique & inside
+        took_alone, told = component_durations(alone.trajectory, alone.of_gaze, task.band), oblique & inside
         found[f"stretching_{name}_median"] = _known(took[told, k] / took_alone[told, k], np.median)
     return found
 

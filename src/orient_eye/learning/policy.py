@@ -38,6 +38,7 @@ NAME = "policy.safetensors"
 _FORMAT = "orient-eye policy 2"
 _OLD_NAME = "policy.json"  # of format 1
 _METADATA = "orient-eye"  # the one key: safetensors would write several in any order
+_ALIKE = 0.05  # of a bound
 _LARGEST_BYTES = 64 * 2**20  # the thesis' networks have 0.1 MB
 
 
@@ -141,18 +142,34 @@ class Policy:
         return SaccadeTask.restore(self.manifest["task"], plant)
 
     def require_actions(self, task: SaccadeTask) -> None:
-        """Refuse a task whose actions mean something else, or whose targets are told by other angles.
+        """Refuse a task whose actions mean something else, so that this policy would not do there what it does here.
+
+        Bounds may differ by `_ALIKE`, as those of D do between an eye and its surrogate.
 
         Raises:
             InputError: says what differs.
         """
-        own = self.task()
-        told = [(t.actions.names, t.targets.name, t.actions.identity().get("rule")) for t in (own, task)]
-        if told[0] != told[1] or self.inputs != GAZE_INPUTS:
-            raise InputError(
-                f"the policy to begin with gives {', '.join(told[0][0])} for {told[0][1]} targets, this task takes "
-                f"{', '.join(told[1][0])} for {told[1][1]} ones; begin with a policy of the same kind"
+        own, words = self.task(), []
+        for what in ("names", "targets", "rule", "pulse", "C"):
+            one, two = (
+                t.targets.name
+                if what == "targets"
+                else list(t.actions.names)
+                if what == "names"
+                else t.actions.identity().get(what)
+                for t in (own, task)
             )
+            if one != two:
+                words.append(f"{what} {in_words(one)}, not {in_words(two)}")
+        if not words and not all(
+            np.allclose(getattr(self, end), getattr(task.actions, end), rtol=_ALIKE) for end in ("low", "high")
+        ):
+            told = (f"{low:.4g} to {high:.4g}" for low, high in zip(self.low, self.high, strict=True))
+            words.append(f"bounds {', '.join(told)}, not those of this task")
+        if self.inputs != GAZE_INPUTS:
+            words.append("networks that see quaternions")
+        if words:
+            raise InputError(f"the policy to begin with has {'; '.join(words)}; begin with one of the same kind")
 
     def require(self, task: SaccadeTask, *, force: bool = False) -> list[str]:
         """Refuse a task the policy was not trained on.

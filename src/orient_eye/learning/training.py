@@ -156,7 +156,7 @@ class _Run:
         networks, saccades, actions, buffer = (int(stream.generate_state(1)[0]) for stream in streams)
         torch.set_num_threads(1)  # these networks are too small to share
         env = self._env()
-        model = self._model(env, seed=networks, buffer_seed=buffer)
+        model = self._model(env, seed=networks, buffer_seed=buffer, resumed=resume)
         env.seed(saccades)  # SB3 has given both the seed of the networks
         model.action_space.seed(actions)
         yardstick, table = self._yardsticks()
@@ -188,7 +188,7 @@ class _Run:
         log = settings.reward_scale == "log"
         return SaccadeVecEnv(settings.saccades_per_rollout, task, log_reward=log, infos=False)
 
-    def _model(self, env: SaccadeVecEnv, *, seed: int, buffer_seed: int) -> OneStepSAC:
+    def _model(self, env: SaccadeVecEnv, *, seed: int, buffer_seed: int, resumed: bool = False) -> OneStepSAC:
         settings = self.settings
         rate, last, temperature = settings.learning_rate, settings.last_learning_rate, settings.temperature
         model = OneStepSAC(
@@ -214,7 +214,7 @@ class _Run:
             },
         )
         model.set_logger(Logger(folder=None, output_formats=[]))
-        origin = _origin(settings, self.task)
+        origin = None if resumed else _origin(settings, self.task)
         if origin is not None:
             model.begin_with(origin.weights, origin.biases, _SPREAD)
         return model

@@ -166,14 +166,3 @@ def _terms(direction: Array, limit_deg: float) -> Array:
     r = r / np.maximum(np.linalg.norm(r, axis=1, keepdims=True), 1.0)
     low = np.add.outer(np.arange(_DEGREE + 1), np.arange(_DEGREE + 1)) <= _DEGREE
     return np.asarray(chebvander2d(r[:, 0], r[:, 1], [_DEGREE, _DEGREE])[:, low.ravel()])
-
-
-def torsion_range(plant: Plant, direction: Array, step_deg: float = 0.25) -> Array:
-    """Least and largest torsion [deg] (n, 2) at which the motors hold directions (n, 3); NaN where at none."""
-    steps = step_deg * np.arange(-round(30 / step_deg), round(30 / step_deg) + 1)
-    flat = np.repeat(direction, len(steps), axis=0)
-    motor = _at(plant, flat, np.tile(steps, len(direction)))[1]
-    held = np.isfinite(motor.sum(axis=1)).reshape(-1, len(steps))
-    some = held.any(axis=1)
-    ends = steps[np.stack([held.argmax(axis=1), len(steps) - 1 - held[:, ::-1].argmax(axis=1)], axis=1)]
-    return np.where(some[:, None], ends, np.nan)

@@ -58,7 +58,8 @@ class ResidualActions(ActionSpace):
         rule: Rule | None = None,
     ) -> None:
         self._plain = PulseStepActions(plant, driven, pulse, C, speed_limit, rates)
-        self.fixations, self.rule = Fixations.of(plant, rule), rule
+        self.rule: Rule | None = None if rule == "least force" else rule  # one law, one identity
+        self.fixations = Fixations.of(plant, self.rule)
         numbers = np.array(self._plain.numbers, dtype=object).reshape(-1, 3)
         known = plant.motor_rates()[self._plain.index]
         low, high = np.array([(k0.low, k0.high) for k0 in numbers[:, 2]]).T

@@ -102,7 +102,7 @@ class SaccadeTask:
         if self.weights.get("force") and self.plant.force(*nobody) is None:
             raise InputError(
                 f"of plant {self.plant.name!r} no elastics are known, so that the force of a fixation cannot be "
-                "judged: give it the weight 0"
+                "judged: choose plant mujoco, tavares or viscous, or give it the weight 0"
             )
         return self
 
