@@ -164,12 +164,12 @@ def test_it_begins_where_the_other_ended(plant: str, first: Path, tmp_path: Path
 
 
 def refuse_others(first: Path, folder: Path) -> None:
-    with pytest.raises(InputError, match="gives B, D, k0 for horizontal targets, this task takes B_ratio_motor1"):
+    with pytest.raises(InputError, match=r"names \[B, D, k0\], not \[B_ratio_motor1"):
         train(replace(TINY, origin="lpf-1"), folder / "one", quiet=True)
     with pytest.raises(InputError, match="no-such-run is no policy"):
         train(replace(TINY, origin=str(folder / "no-such-run")), folder / "two", quiet=True)
     horizontal = replace(TINY, plant="lpf", targets=None, origin=str(first))
-    with pytest.raises(InputError, match="for gaze targets, this task takes B, D, k0 for horizontal ones"):
+    with pytest.raises(InputError, match="targets gaze, not horizontal"):
         train(horizontal, folder / "three", quiet=True)
 
 

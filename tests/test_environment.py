@@ -155,8 +155,10 @@ def test_bad_reset_options_are_refused(options: dict[str, Any], message: str) ->
 
 
 def test_a_start_the_eye_cannot_hold_is_refused() -> None:
-    with pytest.raises(InputError, match="choose one they can hold"):
+    with pytest.raises(InputError, match=r"can be held between -61.8 and 61.8 deg"):
         SaccadeEnv("mujoco").reset(options={"start_yaw_deg": 130.0})
+    with pytest.raises(InputError, match=r"target at 70 deg: the eye .* can be held between -61.8 and 61.8 deg"):
+        SaccadeEnv("mujoco").reset(options={"target_yaw_deg": 70.0})
 
 
 def test_a_step_needs_a_reset_before_it() -> None:

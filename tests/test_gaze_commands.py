@@ -220,7 +220,7 @@ def test_unknown_motors_and_torsions_are_refused(tmp_path: Path, capsys: pytest.
     assert _run([*run, "--driven", "motor2"], as_json=True) == 2
     assert "need all motors" in json.loads(capsys.readouterr().out)["error"]
     assert _run([*run, "--from", "lpf-1"], as_json=True) == 2
-    assert "begin with a policy of the same kind" in json.loads(capsys.readouterr().out)["error"]
+    assert "begin with one of the same kind" in json.loads(capsys.readouterr().out)["error"]
 
 
 def test_a_policy_of_another_kind_of_target_does_not_act_here(modal: Path) -> None:

@@ -28,10 +28,12 @@ from orient_eye.learning.policy import Policy, shipped_policies
 from orient_eye.learning.policy_export import export_onnx, export_sb3, import_sb3
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC
+from orient_eye.listing import with_torsion
+from orient_eye.movement.oblique import toward
 from orient_eye.plants import make_plant
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.resources import data_folder
-from orient_eye.rotations import from_yaw
+from orient_eye.rotations import from_yaw, to_euler
 from orient_eye.surrogate import Surrogate
 from orient_eye.task.cases import Case
 from orient_eye.task.saccade import SaccadeTask
@@ -298,12 +300,22 @@ def test_shipped_policies_keep_what_their_manifests_say() -> None:
         assert shipped.require(task) == []
         result = shipped.manifest["result"]
         assert "out" not in result
-        half = np.array([row["amplitude_deg"] for row in result["table"]]) / 2
-        start, target = task.targets.rest(from_yaw(-half)), from_yaw(half)
+        if task.targets.name == "horizontal":
+            half = np.array([row["amplitude_deg"] for row in result["table"]]) / 2
+            start, target = task.targets.rest(from_yaw(-half)), from_yaw(half)
+        else:
+            around = {"left": 0.0, "left and up": 45.0, "up": 90.0, "left and down": -45.0}
+            ways = np.deg2rad([around[row["direction"]] for row in result["table"]])
+            half = np.array([row["amplitude_deg"] for row in result["table"]])[:, None] / 2
+            ends = half * np.stack([np.cos(ways), np.sin(ways)], axis=1)
+            angles = [np.stack(to_euler(with_torsion(toward(way), 0.0))[:2], axis=-1) for way in (-ends, ends)]
+            start, target = task.targets.rest(task.targets.orientation(angles[0])), task.targets.orientation(angles[1])
         action = shipped.act(start.orientation, target)
         outcome = task.perform(start, action, target)
-        for row, numbers, reward in zip(result["table"], action, outcome.reward.total, strict=True):
-            assert numbers[[0, 2]] == pytest.approx([row["B"], row["k0"]], rel=1e-4)
+        names, told = task.actions.plain.names, task.actions.as_plain(start, target, action)
+        for row, numbers, reward in zip(result["table"], told, outcome.reward.total, strict=True):
+            rates = {name: value for name, value in zip(names, numbers, strict=True) if not name.startswith("D")}
+            assert rates == pytest.approx({name: row[name] for name in rates}, rel=1e-4)
             assert reward == pytest.approx(row["reward"], rel=1e-3)
 
 

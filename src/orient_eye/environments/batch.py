@@ -125,7 +125,7 @@ class SaccadeBatch:
                         told[:, i] = _numbers(key, options.pop(key), (count,))
                 orientations[k] = targets.orientation(told)
             if len(options) < before:
-                targets.check(targets.angles_of(orientations[k]), name)
+                targets.check(targets.angles_of(unit(orientations[k])), name)
         if options:
             known = [f"{name}_{angle}" for name in ("start", "target") for angle in targets.angles]
             raise InputError(
