@@ -255,6 +255,7 @@ class Listing:
         )
         files = ", ".join(f"{picture}.png" for picture in pictures)
         say(f"in {run.path}: result.json, sequence.csv, {files}, sequence.rrd")
+        say(f"the numbers are of all saccades, pictures over time and the recording of the first {shown.stop}")
         say(f"look at the saccades: orient-eye view {run.path}/sequence.rrd")
         return result
 

@@ -53,7 +53,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "reward_scale": "raw",
     },
 }
-FINE_TUNING: dict[str, Any] = {"updates": 3000, "temperature": (3e-3, 3e-4), "learning_rate": 1e-3}
+FINE_TUNING: dict[str, Any] = {"updates": 4000, "warmup": 512, "temperature": (1e-3, 3e-4), "learning_rate": 1e-3}
 """What differs where a run begins with a policy."""
 _LARGEST = {
     "updates": 10**9,
@@ -107,7 +107,7 @@ class TrainConfig:
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
     updates: Annotated[
-        int | None, _default("10000, 7000 on a simulated eye; gaze 26000, with --from 3000; thesis 300000")
+        int | None, _default("10000, 7000 on a simulated eye; gaze 26000, with --from 4000; thesis 300000")
     ] = None
     """How many times the networks are updated; a multiple of 8 is quickest with ours."""
     saccades_per_update: Annotated[int | None, _default("16; thesis 1")] = None
@@ -118,7 +118,7 @@ class TrainConfig:
     """Saccades that one update learns from."""
     replay_size: Annotated[int | None, _default("60000; gaze 150000; thesis 30000")] = None
     """Saccades that the replay buffer holds."""
-    warmup: Annotated[int | None, _default("4096; thesis 8196")] = None
+    warmup: Annotated[int | None, _default("4096; with --from 512; thesis 8196")] = None
     """Saccades with random actions before the first update."""
     learning_rate: Annotated[float | None, _default("0.003; with --from 0.001; thesis 0.00001")] = None
     """Learning rate of the optimiser (Adam)."""
@@ -128,7 +128,7 @@ class TrainConfig:
     """Adam's decay of its mean of squared gradients: how long a large gradient is remembered."""
     temperature: Annotated[
         tuple[float, float] | Literal["auto"] | None,
-        _default("0.1 0.001; gaze 0.02 0.0003, with --from 0.003 0.0003; thesis auto"),
+        _default("0.1 0.001; gaze 0.02 0.0003, with --from 0.001 0.0003; thesis auto"),
     ] = None
     """Entropy temperature at the beginning and at the end; it falls geometrically over the first 80 % of the run.
     With auto it follows the automatic rule of Stable-Baselines3."""

@@ -39,8 +39,8 @@ from orient_eye.task.known_weights import bounds, compared_with_thesis
 from orient_eye.task.saccade import SaccadeTask
 
 _NETS = [128, 128, 32]  # thesis 4.6
-_WAITS = 0.1  # of the run, while the policy it began with waits for a Q that knows what it is worth
-_SPREAD = 0.1  # of that policy's actions
+_WAITS = 0.3  # of the run, while the policy it began with waits for a Q that knows what it is worth
+_SPREAD = 0.05  # of that policy's actions
 _FALLING = 0.6  # of the run, at its end, in which the learning rate falls
 
 
