@@ -79,7 +79,8 @@ def ship(options: Results) -> None:
     best = min(seeds, key=lambda run: json.loads((run / "result.json").read_text())["gap_mean"])
     for name, run in (("tavares-gaze", best), ("modal-gaze", options.folder / "modal-gaze")):
         policy = Policy.load(run)
-        pairs, rows = evaluation_saccades(policy.task(), policy.manifest["result"]["pairs"])  # as the search is today
+        searched = evaluation_saccades(policy.task(), policy.manifest["result"]["pairs"])  # as the search is today
+        pairs, rows = (each.bettered(policy.act) for each in searched)
         found = {**gap_summary(pairs, *pairs.perform(policy.act)), "table": amplitude_table(rows, policy.act)}
         told = {**policy.manifest, "result": {**policy.manifest["result"], **found}}
         goal = replace(policy, manifest=told).save(ROOT / "models" / "policies" / name).parent

@@ -130,7 +130,7 @@ def test_layers_of_another_shape_are_refused(env: SaccadeVecEnv) -> None:
 def test_a_run_of_gaze_saccades_explains_itself(first: Path) -> None:
     result = json.loads((first / "result.json").read_text())
     config = json.loads((first / "run.json").read_text())["config"]
-    assert config["origin"] is None
+    assert config["origin"] == ""
     assert config["doubt"] == 1e-3
     assert config["temperature"] == [0.02, 3e-4]
     assert len(result["bounds"]) == 9

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from orient_eye.cli.another_plant import AnotherPlant
-from orient_eye.cli.saccades import Saccades, refuse_no_saccade
+from orient_eye.cli.saccades import Saccades
 
 if TYPE_CHECKING:
     from orient_eye.cli.command_files import Written
@@ -76,7 +76,6 @@ class Predict:
         rig, writes = self.another_plant.plant_options.get("rig"), self.command or self.commands or self.back
         wired = wiring(task.plant, rig) if rig is not None and writes else None
         start, target = saccades(task.targets, *ends)
-        refuse_no_saccade(start, target)
         action = policy.act(start.orientation, target)
         outcome = task.perform(start, action, target)
         rows = with_peaks(task, outcome, outcome_rows(task, start, target, action, outcome))

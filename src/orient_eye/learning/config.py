@@ -205,7 +205,7 @@ class TrainConfig:
         if self.updates_per_rollout is None and _whole(values["updates"]):
             values["updates_per_rollout"] = math.gcd(values["updates"], values["updates_per_rollout"])
         path = None if self.origin is None else Path(self.origin)  # else the name of a shipped policy
-        values["origin"] = str(path.resolve()) if path is not None and path.exists() else self.origin
+        values["origin"] = str(path.resolve()) if path is not None and path.exists() else self.origin or ""
         values["robust"] = _intervals(task) if self.robust else {}
         return TrainSettings(task=task.identity(), weights_from=task.weights_from, **values)
 
@@ -219,7 +219,7 @@ class TrainSettings:
         weights_from: where the reward's weights are from, in words.
         case: name of the learning case.
         doubt: that of the plant on which it learns.
-        origin: the policy with which it begins, as it was named; None for a new one.
+        origin: the policy with which it begins, with its whole path; none for a new one.
         robust: low and high of the plant's numbers, drawn anew for each saccade; none for the plant as it is.
 
     The others are those of `TrainConfig`.
@@ -246,7 +246,7 @@ class TrainSettings:
     evaluation_pairs: int
     seed: int
     doubt: float = DOUBT
-    origin: str | None = None
+    origin: str = ""
     robust: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -4,7 +4,7 @@ The gap of a saccade is (R* - R) / |R*|, with R* the reward of the searched opti
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +83,14 @@ class Yardstick:
     def plain(self, action: Array) -> Array:
         """Actions (saccades, numbers) told as those of the plain task."""
         return self.task.actions.as_plain(self.start, self.target, action)
+
+    def bettered(self, act: Act) -> "Yardstick":
+        """With the actions of a policy where the search has missed better ones: of several motors it sometimes does."""
+        action, outcome, gap = self.perform(act)
+        wins = gap < 0
+        best = np.where(wins[:, None], self.plain(action), self.optimum.action)
+        reward = np.where(wins, outcome.reward.total, self.optimum.reward)
+        return replace(self, optimum=replace(self.optimum, action=best, reward=reward))
 
     def perform(self, act: Act) -> tuple[Array, Outcome, Array]:
         """The policy's actions (saccades, numbers), what came of them, and the gaps (saccades,)."""

@@ -127,7 +127,7 @@ def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOIN
 
 def _origin(settings: TrainSettings, task: SaccadeTask) -> Policy | None:
     """The policy with which a run begins, where there is one."""
-    if settings.origin is None:
+    if not settings.origin:
         return None
     policy = Policy.load(settings.origin)
     policy.require_actions(task)
@@ -203,7 +203,7 @@ class _Run:
             learning_starts=self._warmup_steps() * env.num_envs,
             train_freq=1,
             gradient_steps=settings.updates_per_rollout,
-            policy_waits=0 if settings.origin is None else round(_WAITS * settings.updates),
+            policy_waits=round(_WAITS * settings.updates) if settings.origin else 0,
             seed=seed,
             device=settings.device,
             policy_kwargs={
