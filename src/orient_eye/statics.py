@@ -17,7 +17,7 @@ from orient_eye.errors import InputError
 from orient_eye.motor import names
 from orient_eye.movement.oblique import toward
 from orient_eye.plants import Plant
-from orient_eye.plants.fixation import fixate
+from orient_eye.plants.fixation import fixate, knows_elastics
 
 Array = NDArray[np.float64]
 _AHEAD = np.array([1.0, 0.0, 0.0])
@@ -101,7 +101,7 @@ def require_elastics(plant: Plant) -> None:
     Raises:
         InputError: says why.
     """
-    if plant.force(np.empty((0, 4)), np.empty((0, len(plant.motors)))) is None:
+    if not knows_elastics(plant):
         raise InputError(f"of plant {plant.name!r} no elastics are known, so no torsion is of least force; {_FORCES}")
     turn = degrees_per_motor(plant)
     if np.linalg.matrix_rank(turn, tol=1e-3) < 3:

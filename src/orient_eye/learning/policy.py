@@ -149,18 +149,12 @@ class Policy:
         Raises:
             InputError: says what differs.
         """
-        own, words = self.task(), []
-        for what in ("names", "targets", "rule", "pulse", "C"):
-            one, two = (
-                t.targets.name
-                if what == "targets"
-                else list(t.actions.names)
-                if what == "names"
-                else t.actions.identity().get(what)
-                for t in (own, task)
-            )
-            if one != two:
-                words.append(f"{what} {in_words(one)}, not {in_words(two)}")
+        own, here = (
+            {"names": list(t.actions.names), "targets": t.targets.name}
+            | {key: t.actions.identity().get(key) for key in ("rule", "pulse", "C")}
+            for t in (self.task(), task)
+        )
+        words = [f"{key} {in_words(own[key])}, not {in_words(here[key])}" for key in own if own[key] != here[key]]
         if not words and not all(
             np.allclose(getattr(self, end), getattr(task.actions, end), rtol=_ALIKE) for end in ("low", "high")
         ):

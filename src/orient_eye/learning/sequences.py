@@ -30,7 +30,7 @@ from orient_eye.movement.oblique import (
     toward,
 )
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.plants.fixation import Fixations
+from orient_eye.plants.fixation import Fixations, knows_elastics
 from orient_eye.state import State
 from orient_eye.statics import degrees_per_motor
 from orient_eye.task.residual_actions import ResidualActions
@@ -260,7 +260,7 @@ def torsion_columns(made: Sequence) -> dict[str, Any]:
 
 def imposed(task: SaccadeTask) -> str:
     """In words what the actions and the reward say of torsion before anything is learned."""
-    actions, elastics = task.actions, _elastics_known(task)
+    actions, elastics = task.actions, knows_elastics(task.plant)
     force = task.weights.get("force", 0.0) if elastics else 0.0
     judged = (
         f"the reward favours that of the least force (weight {force:g})" if force else "the reward knows no torsion"
@@ -285,7 +285,7 @@ def imposed(task: SaccadeTask) -> str:
 
 def least_force(task: SaccadeTask) -> Fixations | None:
     """The fixations of least force; None where no elastics are known."""
-    return Fixations.of(task.plant) if _elastics_known(task) else None
+    return Fixations.of(task.plant) if knows_elastics(task.plant) else None
 
 
 def on_the_way(made: Sequence) -> Array:
@@ -297,10 +297,6 @@ def on_the_way(made: Sequence) -> Array:
 def gaze_error(made: Sequence) -> Array:
     """Angle between where the gaze came to rest and the target [deg], (sequences x saccades,)."""
     return rotations.angle_between_directions(rotations.gaze(made.measures.final), rotations.gaze(made.target))
-
-
-def _elastics_known(task: SaccadeTask) -> bool:
-    return task.plant.force(np.empty((0, 4)), np.empty((0, len(task.plant.motors)))) is not None
 
 
 def _first(made: Sequence, off: Array) -> list[dict[str, Any]]:

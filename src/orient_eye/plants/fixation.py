@@ -101,6 +101,11 @@ class Fixations:
 _SOLVED: dict[str, Fixations] = {}  # of plants of this process, by identity: an eye's never change
 
 
+def knows_elastics(plant: Plant) -> bool:
+    """Whether the force of a fixation is known on this plant."""
+    return plant.force(np.empty((0, 4)), np.empty((0, len(plant.motors)))) is not None
+
+
 def fixate(plant: Plant, direction: Array, rule: Rule | None = None) -> tuple[Array, Array, Array]:
     """Torsion [deg] (n,), motors (n, motors) and force [N^2] (n,) of fixations; NaN where the motors cannot hold one.
 
@@ -109,10 +114,10 @@ def fixate(plant: Plant, direction: Array, rule: Rule | None = None) -> tuple[Ar
         direction: of gaze, (n, 3).
         rule: as of `Fixations.of`.
     """
-    count, motors = len(direction), names(plant.motors)
+    count = len(direction)
     if rule == "fick":
         return _at(plant, direction, listing.ficks_torsion(direction))
-    if rule == "listing" or plant.force(np.empty((0, 4)), np.empty((0, len(motors)))) is None:
+    if rule == "listing" or not knows_elastics(plant):
         return _at(plant, direction, np.zeros(count))
     torsion, step = np.zeros(count), 0.0
     offsets = _TORSIONS

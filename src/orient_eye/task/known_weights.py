@@ -29,6 +29,7 @@ from platformdirs import user_cache_path
 
 from orient_eye.errors import InputError
 from orient_eye.files import write_text
+from orient_eye.plants.fixation import knows_elastics
 from orient_eye.resources import data_folder
 from orient_eye.task.actions import B_RANGE, K0_RANGE, PulseStepActions
 from orient_eye.task.judge import JUDGES
@@ -125,7 +126,7 @@ def in_all_directions(task: SaccadeTask, error_deg: float | None = None) -> tupl
         found, where = dict(simple.weights), simple.weights_from
     else:
         found, where = solve(simple, error_deg)
-    elastics = task.plant.force(np.empty((0, 4)), np.empty((0, len(task.plant.motors)))) is not None
+    elastics = knows_elastics(task.plant)
     weights = {
         **found,
         "overshoot": SLOW_OVERSHOOT * found["overshoot"],

@@ -23,6 +23,7 @@ from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import Plant, restore_plant
+from orient_eye.plants.fixation import knows_elastics
 from orient_eye.state import State, unit
 from orient_eye.task.actions import ACTIONS, ActionSpace, restore_actions
 from orient_eye.task.cases import CASES, Case
@@ -98,8 +99,7 @@ class SaccadeTask:
 
     def _force_known(self) -> "SaccadeTask":
         """Itself, if nothing is to be judged of which the plant knows nothing."""
-        nobody = np.empty((0, 4)), np.empty((0, len(self.plant.motors)))
-        if self.weights.get("force") and self.plant.force(*nobody) is None:
+        if self.weights.get("force") and not knows_elastics(self.plant):
             raise InputError(
                 f"of plant {self.plant.name!r} no elastics are known, so that the force of a fixation cannot be "
                 "judged: choose plant mujoco, tavares or viscous, or give it the weight 0"
