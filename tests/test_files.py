@@ -4,9 +4,12 @@ import io
 import json
 import os
 import shutil
+import socket
 import stat
 import subprocess
 import sys
+import time
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import metadata
@@ -19,14 +22,27 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from fuzzing import budget
+from orient_eye import files
 from orient_eye.commands.motor_file import WrittenCommand, read_command, write_command
 from orient_eye.errors import InputError
-from orient_eye.files import remove_leftovers, write_atomically, write_table, write_text
+from orient_eye.eyes.model import build_model, model_hash
+from orient_eye.files import (
+    read_bytes,
+    read_json,
+    remove_leftovers,
+    write_atomically,
+    write_json,
+    write_table,
+    write_text,
+)
 from orient_eye.motor import Motor
 from orient_eye.movement.trajectory import Trajectory, concatenate
 from orient_eye.plants import Plant, make_plant
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.plants.mujoco import MujocoPlant
+from orient_eye.recording import record
+from orient_eye.resources import data_folder, user_cache
 from orient_eye.rotations import from_yaw
 from orient_eye.run_directory import RunDirectory, versions
 from orient_eye.surrogate import Surrogate
@@ -222,6 +238,155 @@ def test_files_that_cannot_be_read(tmp_path: Path, eye: Plant) -> None:
         read_command(binary, eye.motors)
 
 
+# --- inputs of any kind ---------------------------------------------------------------------------
+
+
+def fifo(folder: Path) -> Path:
+    path = folder / "pipe"
+    os.mkfifo(path)
+    return path
+
+
+@posix
+def test_what_a_unix_user_gives_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Links, pipes of a slow writer, a shell's <(...), /dev/stdin, /dev/null; all up to their end."""
+    monkeypatch.setattr(files, "_PATIENCE_S", 0.3)
+    content = b"line\n" * 100_000  # more than a pipe holds
+    real = tmp_path / "real.txt"
+    real.write_bytes(content)
+    (tmp_path / "link.txt").symlink_to("real.txt")
+    assert read_bytes(tmp_path / "link.txt", most=len(content), hint="") == content
+    assert read_bytes("/dev/null", most=10, hint="") == b""
+
+    def write_late(path: Path | int) -> None:
+        with open(path, "wb") as pipe:
+            time.sleep(0.6)  # longer than one waits for somebody to come
+            pipe.write(content)
+
+    pipe, (end, other) = fifo(tmp_path), os.pipe()
+    with ThreadPoolExecutor(2) as writers:
+        writers.submit(write_late, pipe)
+        writers.submit(write_late, other)
+        assert read_bytes(pipe, most=len(content), hint="") == content
+        assert read_bytes(f"/dev/fd/{end}", most=len(content), hint="") == content
+    os.close(end)
+    code = (
+        "import sys; from orient_eye.files import read_bytes; print(len(read_bytes('/dev/stdin', most=9**9, hint='')))"
+    )
+    assert run(code, input="x" * 200_000).stdout == "200000\n"
+
+
+@posix
+@pytest.mark.parametrize("kind", ["pipe", "endless", "folder", "socket", "nul", "loop", "nowhere", "too long", "below"])
+def test_what_cannot_be_read_says_so_in_seconds(tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "_PATIENCE_S", 0.2)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "file").write_text("")
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket")
+        path, why = {
+            "pipe": (fifo(tmp_path), "it is a pipe, and nobody writes to it"),
+            "endless": ("/dev/zero", "it is larger than 1 MB"),
+            "folder": (tmp_path, "Is a directory"),
+            "socket": ("socket", "No such device"),
+            "nul": ("a\0b", "a file name holds no NUL"),
+            "loop": ("loop", "symbolic links"),
+            "nowhere": ("nowhere", "No such file or directory"),
+            "too long": ("x" * 300, "name too long"),
+            "below": ("file/x", "Not a directory"),
+        }[kind]
+        begun = time.monotonic()
+        with pytest.raises(InputError, match=rf"^cannot read .*{why}.*; give another$") as caught:
+            read_bytes(path, most=2**20, hint="give another")
+        assert time.monotonic() - begun < 5
+        assert "Errno" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "NaN", "[1, -Infinity]", "1e400", '{"a": 1' + "0" * 400 + "}", "[" * 100_000, "[" * 101 + "]" * 101,
+     '"\\ud800"', "\xff", '{"a": ' * 5000],
+)  # fmt: skip
+def test_json_that_no_file_of_ours_holds(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(InputError, match=r"^cannot read .*a\.json: .*; give another$") as caught:
+        read_json(path, hint="give another")
+    assert len(str(caught.value)) < 1000
+
+
+@given(
+    value=st.recursive(
+        st.none() | st.booleans() | st.integers(-(10**20), 10**20) | st.floats(-1e300, 1e300) | st.text(),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+        max_leaves=8,
+    )
+)
+@budget(50)
+def test_json_comes_back(tmp_path_factory: pytest.TempPathFactory, value: Any) -> None:
+    assert read_json(write_json(tmp_path_factory.mktemp("json") / "a.json", value), hint="") == value
+
+
+def test_numbers_that_json_does_not_have_are_null(tmp_path: Path) -> None:
+    path = write_json(tmp_path / "a.json", {"a": np.array([1.0, np.nan]), "b": (np.inf, np.int64(2)), "c": tmp_path})
+    assert read_json(path, hint="") == {"a": [1.0, None], "b": [None, 2], "c": str(tmp_path)}
+
+
+# --- eyes -----------------------------------------------------------------------------------------
+
+
+@posix
+def test_eyes_that_were_edited_or_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each says what is wrong with which file, and MuJoCo leaves no log in the working folder."""
+    monkeypatch.chdir(tmp_path)
+    good = (data_folder("eye_mjcf") / "eye3.xml").read_text(encoding="utf-8")
+    (tmp_path / "meshes").symlink_to(data_folder("eye_mjcf") / "meshes")
+    path = tmp_path / "own.xml"
+    path.write_text(good, encoding="utf-8")
+    assert model_hash(build_model(str(path))) == model_hash(build_model("thesis"))
+    for text, told in {
+        good[: len(good) // 2]: "XML",
+        good.replace('joint="motor2"', 'joint="other"'): "it has no joint 'other'",
+        good.replace('<joint name="eye"', '<joint name="ball"'): "it has no joint 'eye'",
+        good.replace('name="orientation"', 'name="facing"'): "orientation",
+        good.replace("sclera.stl", "nowhere.stl"): "nowhere.stl",
+        good.replace('damping="', 'damping="nan" user="', 1): "friction nan",
+        good.replace('damping="0.02"', 'damping="0"'): "friction 0",
+        good.replace('armature="1"', 'armature="0"'): "motor 'motor1' has armature 0",
+        "": "own.xml",
+        "<mujoco/>": "it has no body 'eye'",
+    }.items():
+        assert text != good
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=rf"own\.xml(?s:.*)({told})(?s:.*)(add an eye|is no eye)"):
+            build_model(str(path))
+    path.unlink()
+    for make in (lambda: os.mkfifo(path), lambda: (path.unlink(), path.mkdir())):
+        make()
+        with pytest.raises(InputError, match=r"own\.xml is no eye: there is no such file; give an MJCF file"):
+            build_model(str(path))
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["meshes", "own.xml"]
+
+
+def test_a_user_without_a_home_has_a_cache_until_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless(*_: str) -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr("platformdirs.user_cache_path", homeless)
+    one = write_text(user_cache("weights") / "a.json", "{}")
+    assert one == user_cache("weights") / "a.json"
+    code = """
+import platformdirs
+def homeless(*_):
+    raise RuntimeError
+platformdirs.user_cache_path = homeless
+from orient_eye.resources import user_cache
+print(user_cache("weights"))
+"""
+    assert not Path(run(code).stdout.strip()).parent.exists()
+
+
 # --- trajectories ---------------------------------------------------------------------------------
 
 
@@ -319,7 +484,21 @@ def test_csv_of_a_batch_is_refused(tmp_path: Path) -> None:
 
 
 def bad_npz(folder: Path) -> dict[str, bytes]:
-    good = trajectory(1).save_npz(folder / "good.npz")
+    one = trajectory(1)
+    good = one.save_npz(folder / "good.npz")
+
+    def told(**other: Array) -> bytes:
+        return replace(one, **other).save_npz(folder / "told.npz").read_bytes()
+
+    def packed(name: str, content: bytes) -> bytes:
+        file = io.BytesIO()
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr(name, content)
+        return file.getvalue()
+
+    header = b"\x93NUMPY\x01\x00" + (118).to_bytes(2, "little")
+    hole = one.orientation.copy()
+    hole[0, 3] = np.nan
     other = folder / "other.npz"
     np.savez(other, a=np.zeros(3))
     pickled = folder / "pickled.npz"
@@ -335,21 +514,30 @@ def bad_npz(folder: Path) -> dict[str, bytes]:
         "nothing": b"",
         "text": b"t_s,q_w\n0,1\n",
         "damaged": whole[:200] + bytes(100) + whole[300:],
+        "a strange header": packed("tendon_names.npy", header + b"(" * 118),
+        "a bomb": packed("tendon_names.npy", bytes(2**24)).replace((2**24).to_bytes(4, "little"), b"\xff\xff\xff\xff"),
+        "NaN": told(orientation=hole),
+        "a tiny eye": told(orientation=one.orientation * 1e-300),
+        "a huge eye": told(orientation=one.orientation * 1e200),
+        "another shape": told(motor=one.motor[:, :-1]),
+        "whole numbers": told(motor=np.ones(one.motor.shape, int)),
+        "time that goes back": told(time=-one.time),
+        "time in years": told(time=one.time * 1e9),
     }
 
 
-@pytest.mark.parametrize(
-    "kind", ["other arrays", "pickle", "one array", "half a file", "nothing", "text", "damaged"]
-)  # fmt: skip
-def test_files_that_are_no_trajectory_are_refused(tmp_path: Path, kind: str) -> None:
+def test_files_that_are_no_trajectory_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "bad.npz"
-    path.write_bytes(bad_npz(tmp_path)[kind])
-    with pytest.raises(InputError, match=r"bad\.npz is not a trajectory file \(.npz written by orient-eye\)"):
-        Trajectory.load_npz(path)
+    for kind, content in bad_npz(tmp_path).items():
+        path.write_bytes(content)
+        with pytest.raises(
+            InputError, match=r"bad\.npz is not a trajectory file: .*; give an \.npz file that orient-eye"
+        ):
+            pytest.fail(f"{kind}: {Trajectory.load_npz(path)}")
 
 
 def test_a_missing_trajectory_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"nowhere\.npz is not a trajectory file"):
+    with pytest.raises(InputError, match=r"cannot read .*nowhere\.npz: No such file or directory; give an \.npz"):
         Trajectory.load_npz(tmp_path / "nowhere.npz")
 
 
@@ -472,6 +660,7 @@ def test_places_that_may_not_be_written(tmp_path: Path) -> None:
 import os
 from pathlib import Path
 from orient_eye.errors import InputError
+from orient_eye.eyes.model import build_model, model_hash
 from orient_eye.files import write_text
 from orient_eye.run_directory import RunDirectory
 if os.getuid() == 0:
@@ -523,6 +712,14 @@ def test_a_pipe_is_written_to(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.load(io.BytesIO(content.result()))["a"], [0, 1, 2])
     assert stat.S_ISFIFO(pipe.stat().st_mode)
     assert list(tmp_path.iterdir()) == [pipe]
+
+
+@posix
+def test_a_pipe_that_nobody_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "_PATIENCE_S", 0.2)
+    with pytest.raises(InputError, match=r"pipe: .*; it is a pipe that nobody reads"):
+        write_text(fifo(tmp_path), "anything")
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
 
 
 @pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="no /dev/full, the device that is always full")
@@ -597,6 +794,18 @@ def test_table(tmp_path: Path) -> None:
     assert path.read_text().startswith("a,b")
 
 
+def test_a_recording_that_came_out_damaged_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the SDK returns: an older one stays."""
+    path = record(tmp_path / "a.rrd", flat(1, 5))
+    whole = path.read_bytes()
+    for damaged in (whole[:-3], whole[3:], b""):
+        monkeypatch.setattr("orient_eye.recording.stream._recorded", lambda *_, found=damaged: found)
+        with pytest.raises(InputError, match=r"a\.rrd: the recording came out damaged; name another file"):
+            record(path, flat(1, 5))
+    assert path.read_bytes() == whole
+    assert list(tmp_path.iterdir()) == [path]
+
+
 FILL = """
 import sys
 from pathlib import Path
@@ -604,8 +813,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from orient_eye import figures, files
 from orient_eye.errors import InputError
+from orient_eye.eyes.model import build_model, model_hash
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.recording import record
+from orient_eye.resources import data_folder, user_cache
 
 folder = Path(sys.argv[1])
 noise = np.random.default_rng(0).random(30_000)
@@ -714,18 +925,26 @@ def test_files_that_are_no_surrogate_are_refused(tmp_path: Path, content: str) -
     path = tmp_path / "surrogate.json"
     path.write_text(content, encoding="utf-8")
     with pytest.raises(
-        InputError, match=r"surrogate\.json is no surrogate \(.*orient-eye sysid.*shipped.*: mujoco, thesis"
+        InputError, match=r"surrogate\.json( is no surrogate \(|: ).*orient-eye sysid.*shipped.*: mujoco, thesis"
     ):
         Surrogate.load(path)
 
 
-@pytest.mark.parametrize("values", [{"K": 0}, {"w0": 0}, {"w0": -17.5}, {"K": float("nan")}, {"w0": float("inf")}])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"K": 0}, {"w0": 0}, {"w0": -17.5}, {"K": 1e300}, {"w0": 1e-300}, {"dead_time": -1}, {"dead_time": "0"},
+        {"motor": 3}, {"details": []}, {"rig": "rig.toml"}, {"axis": "tilt"}, {"axis": []}, {"range": [1, 2, 3]},
+        {"range": 5}, {"range": ["a", "b"]}, {"intervals": {"K": 1}}, {"speed_limit": 0}, {"w0": True},
+    ],
+)  # fmt: skip
 def test_impossible_surrogates_are_refused(tmp_path: Path, values: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=r"finite gain K != 0 and positive w0, or wn and zeta, got \{'K': .*, 'w0': "):
+    (name,) = values
+    with pytest.raises(InputError, match=rf"{name}|a rig|{{'K': 0.*}}"):
         Surrogate(**({"K": 1.4, "w0": 17.5} | values))
     path = tmp_path / "surrogate.json"
     path.write_text(json.dumps(GOOD | values), encoding="utf-8")
-    with pytest.raises(InputError, match="finite gain"):
+    with pytest.raises(InputError, match=r"surrogate\.json is no surrogate \(.*got .*\); give"):
         Surrogate.load(path)
 
 
@@ -733,13 +952,14 @@ def test_impossible_surrogates_are_refused(tmp_path: Path, values: dict[str, flo
 def test_a_surrogate_is_of_one_order(tmp_path: Path, values: dict[str, Any]) -> None:
     path = tmp_path / "surrogate.json"
     path.write_text(json.dumps(GOOD | values), encoding="utf-8")
-    with pytest.raises(InputError, match="a surrogate has w0, or wn and zeta, got"):
+    with pytest.raises(InputError, match=r"a surrogate has a gain K .*, and w0, or wn and zeta, got"):
         Surrogate.load(path)
 
 
 def test_a_missing_surrogate_is_refused(tmp_path: Path) -> None:
-    for name in (tmp_path / "nowhere.json", "thesys", tmp_path):
-        with pytest.raises(InputError, match=r"is no surrogate .*shipped.*: mujoco, thesis"):
+    for name, told in ((tmp_path / "nowhere.json", "there is no such file"), ("thesys", "there is no such file"),
+                       (tmp_path, "Is a directory"), ("nul\0", "there is no such file")):  # fmt: skip
+        with pytest.raises(InputError, match=rf"{told}; give .*shipped.*: mujoco, thesis"):
             Surrogate.load(name)
 
 

@@ -189,6 +189,9 @@ def spoil(file: Path, damage: str) -> None:
         "no task": lambda: rewrite(file, task=None),
         "a strange task": lambda: rewrite(file, task={**task, "plant": "lpf"}),
         "strange actions": lambda: rewrite(file, task={**task, "actions": "pulse-step"}),
+        "a number beyond floats": lambda: rewrite(file, result=10**400),
+        "NaN in words": lambda: rewrite(file, result={"gap_mean": float("nan")}),
+        "a name too few": lambda: rewrite(file, numbers=[]),
         "a strange result": lambda: rewrite(file, result=[1]),
         "other bounds": lambda: rewrite(file, task=bounds),
         "NaN": lambda: rewrite(file, {"weight1": np.full((32, 16), np.nan)}),
@@ -208,13 +211,13 @@ def spoil(file: Path, damage: str) -> None:
 @pytest.mark.parametrize(
     ("damage", "words"),
     [
-        ("truncated", "damaged"),
+        ("truncated", "cannot read"),
         ("one bit of the arrays", "SHA-256"),
         ("one digit of the manifest", "SHA-256"),
-        ("nothing in it", "damaged"),
+        ("nothing in it", "cannot read"),
         ("no file", "there is no"),
-        ("text", "no safetensors file"),
-        ("a huge header", "damaged"),
+        ("text", "cannot read"),
+        ("a huge header", "cannot read"),
         ("no metadata", "not of the format"),
         ("a deep manifest", "is no policy"),
         ("a list", "not of the format"),
@@ -223,6 +226,9 @@ def spoil(file: Path, damage: str) -> None:
         ("no task", "'task'"),
         ("a strange task", "not an object"),
         ("strange actions", "is no policy"),
+        ("a number beyond floats", "is no finite number"),
+        ("NaN in words", "NaN is no finite number"),
+        ("a name too few", "gives 3 numbers, but not as many names"),
         ("a strange result", "not an object"),
         ("other bounds", "bounds"),
         ("NaN", "finite"),
@@ -254,7 +260,7 @@ def test_a_file_larger_than_any_policy_is_not_read(policy: Policy, tmp_path: Pat
     file = policy.save(tmp_path)
     with file.open("r+b") as opened:
         opened.truncate(2**40)  # a hole: it takes no room
-    with pytest.raises(InputError, match="larger than any policy"):
+    with pytest.raises(InputError, match=r"policy\.safetensors: it is larger than 64 MB; give a run directory"):
         Policy.load(tmp_path)
 
 
@@ -271,7 +277,7 @@ class Bomb:
 def test_a_pickle_in_place_of_a_policy_does_not_run(policy: Policy, tmp_path: Path) -> None:
     trace = tmp_path / "trace"
     policy.save(tmp_path).write_bytes(pickle.dumps(Bomb(trace)))
-    with pytest.raises(InputError, match="no safetensors file"):
+    with pytest.raises(InputError, match=r"^cannot read .*policy\.safetensors: .*; give a run directory"):
         Policy.load(tmp_path)
     assert not trace.exists()
 
@@ -562,10 +568,18 @@ def test_networks_that_would_act_otherwise_are_not_imported(task: SaccadeTask, t
     two = SaccadeTask.of_case(make_plant("tavares"), "1", driven=("motor1", "motor2"), weights=WEIGHTS)
     with pytest.raises(InputError, match="gives 3 numbers"):
         import_sb3(stock(tmp_path, task), two)
-    for content in (b"", b"no zip"):
-        (tmp_path / "bad.zip").write_bytes(content)
-        with pytest.raises(InputError, match="no zip of a Stable-Baselines3"):
+    for content in (b"", b"no zip", b"[" * 100_000, b"10" * 300, b"NaN     NaN"):
+        (tmp_path / "bad.zip").write_bytes(content[:1000])
+        if len(content) > 10:
+            with zipfile.ZipFile(tmp_path / "bad.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+                archive.writestr("data", content)
+                archive.writestr("policy.pth", b"")
+        with pytest.raises(
+            InputError, match=r"no zip of a Stable-Baselines3 SAC: .*; give a zip that SAC's save wrote"
+        ):
             import_sb3(tmp_path / "bad.zip", task)
+    with pytest.raises(InputError, match=r"cannot read .*nowhere\.zip: No such file or directory; give a zip"):
+        import_sb3(tmp_path / "nowhere.zip", task)
 
 
 def test_importing_a_zip_runs_none_of_its_code(task: SaccadeTask, tmp_path: Path) -> None:

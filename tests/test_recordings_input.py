@@ -5,6 +5,7 @@ of the project; where they are at hand, in ../shared, what they say is tested to
 """
 
 import json
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from make_prototype_log import Logs, Rig, main, make_logs, text
 from orient_eye import rotations
 from orient_eye.cli.sysid import Sysid
 from orient_eye.errors import InputError
+from orient_eye.eyes.model import build_model, motors
 from orient_eye.plants import make_plant
 from orient_eye.rig import Rig as Described
 from orient_eye.rig import RigMotor
@@ -23,6 +25,7 @@ from orient_eye.surrogate import Surrogate
 from orient_eye.sysid import StepResponse, identify_recordings, prototype_log, read_recording, read_recordings
 from orient_eye.sysid.fit import fit_model
 from orient_eye.sysid.models import MODELS
+from orient_eye.sysid.physical_recordings import read_physical
 from orient_eye.sysid.recording_checks import doubts_of, warnings_of
 from orient_eye.sysid.replay import replay
 from orient_eye.sysid.report import write_report
@@ -174,6 +177,39 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
         read_recordings([good, tmp_path / ".." / tmp_path.name / "step.csv"])
     with pytest.raises(InputError, match=r"2 rows until 0\.03 s"):
         read_recordings([good], until=0.03)
+
+
+def test_recordings_through_links_and_pipes(tmp_path: Path) -> None:
+    """As files are: also a log read for all motors, which a pipe gives only once. A link is no second recording."""
+    good = written(tmp_path, table(motor_deg=None, tau2_deg=10.0 * (T > 0), yaw_deg=EYE))
+    log = made_files(tmp_path)[0]
+    link = tmp_path / "link.csv"
+    link.symlink_to(good)
+    with pytest.raises(InputError, match=r"step\.csv is named twice"):
+        read_recordings([good, link])
+    three = motors(build_model(visual=False))
+    for path, read in (
+        (good, read_recording),
+        (good, lambda each: read_physical(each, three)),
+        (log, lambda each: read_physical(each, three)),
+    ):
+        with subprocess.Popen(["cat", path], stdout=subprocess.PIPE) as shell:
+            assert shell.stdout is not None
+            through = read(Path(f"/dev/fd/{shell.stdout.fileno()}"))
+        np.testing.assert_array_equal(through.time, read(path).time)
+
+
+@pytest.mark.parametrize("column", ["t_s", "motor_deg", "eye_deg"])
+@pytest.mark.parametrize("factor", [1e-300, 1e200])
+def test_numbers_that_overflow_when_they_are_used(column: str, factor: float, tmp_path: Path) -> None:
+    """Named, or so small that they do no harm."""
+    values = {"t_s": T, "motor_deg": 10.0 * (T > 0), "eye_deg": EYE}[column] * factor
+    path = written(tmp_path, table(**{column: values}))
+    if column == "eye_deg" and factor < 1:
+        assert "are these radians" in " ".join(doubts_of(read_recording(path)))
+    else:
+        with pytest.raises(InputError, match=rf"step\.csv.*({column} is beyond 1e\+20|time must rise|does not move)"):
+            read_recording(path)
 
 
 def test_recordings_that_tell_little_are_warned_of(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Output files appear whole or not at all, and what keeps them from it is an InputError."""
+"""Outputs appear whole or not at all, inputs are read within bounds, and what keeps them from it is an InputError."""
 
 import csv
 import errno
@@ -11,12 +11,15 @@ import secrets
 import shutil
 import stat
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orient_eye.errors import InputError
+from orient_eye.resources import printable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,6 +27,10 @@ if TYPE_CHECKING:
 _MARK = ".tmp-orient-eye"
 _LEFTOVER = re.compile(rf"\..*-[0-9a-f]{{16}}{re.escape(_MARK)}(\.[^.]*)?")
 _STEM, _SUFFIX = 40, 16  # characters; with them a temporary name stays within the 255 bytes of a file name
+
+_LARGEST_JSON = 16 * 2**20  # bytes
+_NESTING = 100
+_PATIENCE_S = 3.0
 
 _ELSEWHERE = "a file stands where a folder is needed, name another place"
 _FORBIDDEN = "name a place that you may write to"
@@ -39,6 +46,7 @@ _ADVICE = {
     errno.ENOTDIR: _ELSEWHERE,
     errno.EISDIR: "name a file in it",
     errno.ENAMETOOLONG: "shorten it",
+    errno.ENXIO: "it is a pipe that nobody reads, or a socket; name another file",
 }
 
 
@@ -107,8 +115,25 @@ def _pour(goal: Path | int, suffix: str, write: Callable[[Path], object]) -> Non
     with tempfile.TemporaryDirectory(prefix="orient-eye-") as folder:
         temporary = Path(folder) / f"output{suffix}"
         write(temporary)
-        with open(goal, "wb", closefd=not isinstance(goal, int)) as target, temporary.open("rb") as source:
+        owned = not isinstance(goal, int)
+        descriptor = goal if isinstance(goal, int) else _awaited(goal)
+        with open(descriptor, "wb", closefd=owned) as target, temporary.open("rb") as source:
             shutil.copyfileobj(source, target)
+
+
+def _awaited(path: Path) -> int:
+    """Descriptor of a device or pipe that is open for writing; for a pipe's reader one waits seconds."""
+    patient = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+        except OSError as error:
+            if error.errno != errno.ENXIO or time.monotonic() > patient:
+                raise
+            time.sleep(_PATIENCE_S / 100)
+        else:
+            os.set_blocking(descriptor, True)
+            return descriptor
 
 
 def _replace(path: Path, old: os.stat_result | None, write: Callable[[Path], object]) -> None:
@@ -156,6 +181,26 @@ def write_text(path: str | Path, text: str) -> Path:
     return write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
+def write_json(path: str | Path, content: Any) -> Path:
+    """Write plain values, NumPy's and paths as a JSON file, atomically; numbers that JSON does not have become null.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    return write_text(path, json.dumps(finite(content), indent=2, default=str, allow_nan=False) + "\n")
+
+
+def finite(value: Any) -> Any:
+    """The same plain value with None for numbers that JSON does not have."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
 def write_table(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """Write rows of plain values as a CSV file with a header, atomically.
 
@@ -171,17 +216,116 @@ def write_table(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     return write_text(path, text.getvalue())
 
 
-def read_arrays(path: Path) -> "tuple[dict[str, NDArray[Any]], dict[str, str]]":
-    """Arrays of a safetensors file by name, and its metadata.
+def read_bytes(path: str | Path, *, most: int, hint: str) -> bytes:
+    """The content of a file, or of a pipe or device up to its end. Links are followed.
+
+    For a pipe's writer it waits as long as one has it open, as every Unix tool does, but only seconds for one to come.
+
+    Args:
+        path: of the file.
+        most: bytes that it may hold.
+        hint: what to give instead, the end of messages.
 
     Raises:
-        OSError: it cannot be read.
-        safetensors.SafetensorError: it is damaged, or none.
+        InputError: it cannot be read, is larger, or a pipe that nobody writes to.
     """
-    import safetensors  # and NumPy with it, which --help does not wait for
+    try:
+        if "\0" in os.fspath(path):
+            raise ValueError("a file name holds no NUL")
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY), "rb", buffering=0) as file:
+            beginning = _beginning(file)
+            with io.BufferedReader(file) as reader:
+                content = beginning + reader.read(most)
+        if len(content) > most:
+            raise ValueError(f"it is larger than {most / 2**20:.3g} MB")
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error, hint) from error
+    return content
 
-    with safetensors.safe_open(path, "numpy") as opened:
-        return {name: opened.get_tensor(name) for name in opened.keys()}, opened.metadata() or {}  # noqa: SIM118  no iterator
+
+def _beginning(file: io.FileIO) -> bytes:
+    """At most one byte, waited for where the file is a pipe; what follows may be waited for too."""
+    pipe, patient = stat.S_ISFIFO(os.fstat(file.fileno()).st_mode), time.monotonic() + _PATIENCE_S
+    while (found := file.read(1)) == b"" and pipe:  # None: somebody has it open, and has not written yet
+        if time.monotonic() > patient:
+            raise ValueError("it is a pipe, and nobody writes to it")
+        time.sleep(_PATIENCE_S / 100)
+    os.set_blocking(file.fileno(), True)
+    return found or b""
+
+
+def unreadable(path: str | Path, error: Exception, hint: str) -> InputError:
+    """Why a file cannot be read, and what to give instead."""
+    why = error.strerror if isinstance(error, OSError) else None
+    return InputError(f"cannot read {printable(path)}: {why or error}; {hint}")
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Plain values of a JSON text.
+
+    Raises:
+        ValueError: it is none, nested more than 100 deep, or has a number that no finite float holds.
+    """
+    try:
+        content = json.loads(text, parse_constant=_number, parse_float=_number, parse_int=_number)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+    level = [content]
+    for _ in range(_NESTING):
+        level = [
+            child for each in level if isinstance(each, dict | list)
+            for child in (each.values() if isinstance(each, dict) else each)
+        ]  # fmt: skip
+    if level:
+        raise ValueError("it is nested too deeply")
+    json.dumps(content, ensure_ascii=False).encode()  # ValueError: halves of characters, which nobody could write
+    return content
+
+
+def _number(text: str) -> float | int:
+    number = float(text)
+    if not isfinite(number):
+        raise ValueError(f"{text[:20]} is no finite number")
+    return int(text) if text.lstrip("-").isdigit() else number
+
+
+def read_json(path: str | Path, *, hint: str) -> Any:
+    """The plain values of a JSON file.
+
+    Args:
+        path: of the file.
+        hint: what to give instead, the end of messages.
+
+    Raises:
+        InputError: it cannot be read, is larger than any of ours, or `parse_json` does not take it.
+    """
+    content = read_bytes(path, most=_LARGEST_JSON, hint=hint)
+    try:
+        return parse_json(content)
+    except ValueError as error:
+        raise unreadable(path, error, hint) from error
+
+
+def read_arrays(path: str | Path, *, most: int, hint: str) -> "tuple[dict[str, NDArray[Any]], dict[str, str]]":
+    """Arrays of a safetensors file by name, and its metadata.
+
+    Args:
+        path: of the file.
+        most: bytes that it may hold.
+        hint: what to give instead, the end of messages.
+
+    Raises:
+        InputError: it cannot be read, is larger, is damaged, or none.
+    """
+    import safetensors.numpy  # and NumPy with it, which --help does not wait for
+
+    content = read_bytes(path, most=most, hint=hint)
+    try:
+        arrays = safetensors.numpy.load(content)
+        header = parse_json(content[8 : 8 + int.from_bytes(content[:8], "little")])
+    except (safetensors.SafetensorError, KeyError, ValueError) as error:  # KeyError: a dtype that NumPy has not
+        raise unreadable(path, error, hint) from error
+    return arrays, header.get("__metadata__", {})
 
 
 def digest(arrays: "Mapping[str, NDArray[Any]]", told: Mapping[str, Any]) -> str:

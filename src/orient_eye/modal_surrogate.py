@@ -8,7 +8,6 @@ of Haustein 1989, so that for small turns it is the angle). Each of its componen
 v_i' = w_i ((K tau)_i - v_i) or the one of second order: the thesis' low-pass filter (3.11) about x, y and z.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -19,15 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from orient_eye import listing
 from orient_eye.errors import InputError
-from orient_eye.files import write_text
+from orient_eye.files import write_json
 from orient_eye.motor import Motor
 from orient_eye.resources import data_folder
+from orient_eye.surrogate import RANGE_DEG, check_kinds, ends, load, number
 
 Array = NDArray[np.float64]
 MODES = ("roll", "pitch", "yaw")
 """The axes x, y and z, in this order."""
 _FORMAT = "orient-eye modal surrogate 1"
-_LARGEST_BYTES = 2**20
 _WORKING_DEG = 40.0  # as of the motors of the eyes it stands for
 
 
@@ -51,13 +50,15 @@ class Mode:
     zeta: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "K", tuple(float(gain) for gain in self.K))
+        object.__setattr__(self, "K", tuple(number("K", gain) for gain in self.K))
         rates = {name: getattr(self, name) for name in ("w0", "wn", "zeta")}
         given = {name: rate for name, rate in rates.items() if rate is not None}
-        if set(given) not in ({"w0"}, {"wn", "zeta"}) or not all(0 < rate < np.inf for rate in given.values()):
+        if set(given) not in ({"w0"}, {"wn", "zeta"}):
             raise InputError(f"a mode has a positive w0, or positive wn and zeta, got {rates}")
-        if not np.isfinite(self.K).all() or not np.any(self.K):
-            raise InputError(f"a mode needs finite gains, one of them not 0, got K = {list(self.K)}")
+        for name, rate in given.items():
+            object.__setattr__(self, name, number(name, rate))
+        if max(map(abs, self.K), default=0.0) < 1e-6:
+            raise InputError(f"a mode needs finite gains, one of them not 0 (1e-6 or more), got K = {list(self.K)}")
 
 
 @dataclass(frozen=True)
@@ -90,15 +91,17 @@ class ModalSurrogate:
             raise InputError(f"a modal surrogate has the modes {', '.join(MODES)}, got {', '.join(self.modes)}")
         object.__setattr__(self, "motors", tuple(self.motors))
         object.__setattr__(self, "modes", {axis: self.modes[axis] for axis in MODES})
-        ranges = None if self.ranges is None else tuple((float(low), float(high)) for low, high in self.ranges)
+        check_kinds(self, {"source": str, "eye": str | None, "details": Mapping})
+        if not all(isinstance(name, str) for name in self.motors):
+            raise InputError(f"motors have names, got {self.motors}")
+        ranges = None if self.ranges is None else tuple(ends("range", each, RANGE_DEG) for each in self.ranges)
         object.__setattr__(self, "ranges", ranges)
+        object.__setattr__(self, "dead_time", number("dead_time", self.dead_time))
         each = {axis: len(mode.K) for axis, mode in self.modes.items()}
         if ranges is not None:
             each["ranges"] = len(ranges)
         if not self.motors or any(count != len(self.motors) for count in each.values()):
             raise InputError(f"a modal surrogate of {len(self.motors)} motors has as many of each number, got {each}")
-        if not 0 <= self.dead_time < np.inf:
-            raise InputError(f"the dead time is not negative, got {self.dead_time} s")
         self.as_motors()  # which checks the ranges
 
     @property
@@ -136,7 +139,7 @@ class ModalSurrogate:
 
     def save(self, path: str | Path) -> Path:
         """Write the JSON file."""
-        return write_text(path, json.dumps({"format": _FORMAT, **self.to_plain()}, indent=2) + "\n")
+        return write_json(path, {"format": _FORMAT, **self.to_plain()})
 
     @classmethod
     def load(cls, path: str | Path) -> "ModalSurrogate":
@@ -145,20 +148,8 @@ class ModalSurrogate:
         Raises:
             InputError: missing, or not a modal surrogate.
         """
-        shipped = shipped_modal_surrogates()
-        file = shipped.get(str(path), Path(path))
-        try:
-            if file.stat().st_size > _LARGEST_BYTES:
-                raise ValueError("it is larger than any surrogate")
-            content = json.loads(file.read_text(encoding="utf-8"))
-            if content.pop("format") != _FORMAT:
-                raise ValueError(f"its format is not {_FORMAT!r}")
-            return cls.from_plain(content)
-        except (OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise InputError(
-                f"{path} is no modal surrogate ({error}); give a surrogate_3d.json written by orient-eye sysid "
-                f"--all-motors, or a shipped one: {', '.join(shipped)}"
-            ) from error
+        writer = "orient-eye sysid --all-motors"
+        return load(path, shipped_modal_surrogates(), "modal surrogate", (_FORMAT,), cls.from_plain, writer)
 
 
 def shipped_modal_surrogates() -> dict[str, Path]:

@@ -4,7 +4,13 @@ They stand at the top of a checkout (`eye_mjcf/`, `models/`) and inside the pack
 (`orient_eye/_data/`). Everything that opens one of them asks here.
 """
 
+import os
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from orient_eye.errors import InputError
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -19,3 +25,42 @@ def data_folder(name: str) -> Path:
         if folder.is_dir():
             return folder
     raise FileNotFoundError(f"orient-eye is installed without its folder {name!r}; install it again")
+
+
+def shipped_or_given(name: str | Path, shipped: Mapping[str, Path], kind: str, hint: str) -> Path:
+    """The file that a user means: a shipped one by its name, else a file of his own.
+
+    Args:
+        name: what he gave.
+        shipped: files by name.
+        kind: of file, for messages.
+        hint: what to give instead, the end of messages.
+
+    Raises:
+        InputError: it is neither.
+    """
+    file = shipped.get(str(name), Path(name))
+    if not os.path.exists(file):  # of a name that no file can have, too
+        raise InputError(f"{printable(name)} is no {kind}: there is no such file; {hint}")
+    return file
+
+
+def user_cache(name: str) -> Path:
+    """A folder of the user's cache (XDG_CACHE_HOME moves it); of a user without a home, one that ends with Python."""
+    import platformdirs  # which --help does not wait for
+
+    try:
+        return platformdirs.user_cache_path("orient-eye") / name
+    except RuntimeError:
+        return Path(_homeless().name) / name
+
+
+@cache
+def _homeless() -> "TemporaryDirectory[str]":
+    return TemporaryDirectory(prefix="orient-eye-")
+
+
+def printable(path: str | Path) -> str:
+    """A path for messages: as it is, or quoted where it holds what no terminal should be sent."""
+    text = str(path)
+    return text if text.isprintable() else repr(text)

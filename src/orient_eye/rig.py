@@ -20,11 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.checks import real, shown
 from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
-from orient_eye.files import write_text
+from orient_eye.files import read_bytes, unreadable, write_text
 from orient_eye.motor import Motor
-from orient_eye.resources import data_folder
+from orient_eye.resources import data_folder, printable, shipped_or_given
 
 Array = NDArray[np.float64]
 _UNITS = {"deg": 1.0, "rad": radians(1.0)}
@@ -64,19 +65,24 @@ class RigMotor:
             raise InputError(f"{told}: unit is deg, rad or counts, got {self.unit!r}")
         if (self.unit == "counts") != (self.counts_per_deg is not None):
             raise InputError(f"{told}: counts_per_deg belongs to unit = 'counts', got {self.counts_per_deg}")
-        if self.counts_per_deg is not None and not 0 < self.counts_per_deg < inf:
-            raise InputError(f"{told}: counts_per_deg is positive, got {self.counts_per_deg}; sign says the direction")
+        if self.counts_per_deg is not None and not 1e-6 <= self.counts_per_deg <= 1e9:
+            raise InputError(
+                f"{told}: counts_per_deg is positive, from 1e-6 to 1e9, got {self.counts_per_deg}; sign says the "
+                "direction"
+            )
         if self.sign not in (1, -1):
-            raise InputError(f"{told}: sign is 1 or -1, got {self.sign}")
-        if not isfinite(self.zero):
-            raise InputError(f"{told}: zero is a finite number, got {self.zero}")
+            raise InputError(f"{told}: sign is 1 or -1, got {shown(self.sign)}")
+        object.__setattr__(self, "sign", int(self.sign))
+        real(f"{told}: zero", self.zero, -1e12, 1e12)
         low, high = self.range
-        if not low < high:
-            raise InputError(f"{told}: range goes from low to high, in deg, got {[low, high]}")
+        if not low < high or any(isfinite(end) and abs(end) > 1e6 for end in self.range):
+            raise InputError(f"{told}: range goes from low to high, in deg, up to 1e6 either way, got {[low, high]}")
         for name in ("speed_limit", "acceleration_limit"):
             limit = getattr(self, name)
-            if limit is not None and not 0 < limit < inf:
-                raise InputError(f"{told}: {name} is positive, or left out where it is not known, got {limit}")
+            if limit is not None and not 1e-3 <= limit <= 1e12:
+                raise InputError(
+                    f"{told}: {name} is positive, or left out where it is not known, from 0.001 to 1e12, got {limit}"
+                )
 
     @property
     def units_per_deg(self) -> float:
@@ -133,9 +139,10 @@ class Rig:
                     f"rig {self.name!r}: an axis is yaw, pitch or roll and names motors among {', '.join(names)}; got "
                     f"{axis} = {dict(drive)}"
                 )
-            if not drive or not all(isfinite(c) and c != 0 for c in drive.values()):
+            if not drive or not all(1e-6 <= abs(c) <= 1e6 for c in drive.values()):
                 raise InputError(
-                    f"rig {self.name!r}: the coefficients of {axis} are finite and not 0, got {dict(drive)}"
+                    f"rig {self.name!r}: the coefficients of {axis} are finite and not 0, from 1e-6 to 1e6 either way, "
+                    f"got {dict(drive)}"
                 )
         if not 1 <= self.command_rate_hz <= 1e5:
             raise InputError(
@@ -206,19 +213,17 @@ class Rig:
         Raises:
             InputError: missing, no TOML, or a key or value that is none.
         """
-        folder = data_folder("models") / "rigs"
-        names = sorted(file.stem for file in folder.glob("*.toml"))
-        file = folder / f"{path}.toml" if str(path) in names else Path(path)
+        shipped = {file.stem: file for file in sorted((data_folder("models") / "rigs").glob("*.toml"))}
+        hint = f"give a TOML file (docs/rigs.md), or a shipped rig: {', '.join(shipped)}"
+        file = shipped_or_given(path, shipped, "rig", hint)
+        text = read_bytes(file, most=_LARGEST_BYTES, hint=hint)
         try:
-            if file.stat().st_size > _LARGEST_BYTES:
-                raise ValueError("it is larger than any rig's description")
-            content = tomllib.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"cannot read the rig {path}: {error}; give a TOML file (docs/rigs.md), or a shipped rig: "
-                f"{', '.join(names)}"
-            ) from error
-        return cls.from_plain(content, str(path))
+            content = tomllib.loads(text.decode("utf-8-sig"))
+        except RecursionError as error:
+            raise unreadable(path, ValueError("it is nested too deeply"), hint) from error
+        except ValueError as error:
+            raise unreadable(path, error, hint) from error
+        return cls.from_plain(content, printable(path))
 
     @classmethod
     def from_plain(cls, content: Mapping[str, Any], source: str) -> "Rig":
@@ -238,9 +243,9 @@ class Rig:
                 str(a): {str(n): float(c) for n, c in drive.items()} for a, drive in content.get("axes", {}).items()
             }
             rate = float(content.get("command_rate_hz", 100.0))
-        except (TypeError, ValueError, AttributeError) as error:
-            if isinstance(error, InputError):
-                raise
+        except InputError:
+            raise
+        except (TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"{source} describes no rig: {error}; docs/rigs.md shows one") from error
         return cls(str(content.get("name", Path(source).stem)), motors, axes, rate, str(content.get("notes", "")))
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from orient_eye.errors import InputError
-from orient_eye.files import explained, write_text
+from orient_eye.files import explained, finite, read_json, write_json
 
 _PACKAGES = (
     "orient-eye", "mujoco", "numpy", "scipy", "gymnasium", "stable-baselines3", "torch", "safetensors", "rerun-sdk",
@@ -43,31 +43,37 @@ class RunDirectory:
             seed: of all random generators, None where nothing is random.
 
         Raises:
-            InputError: the directory holds something already, or cannot be made.
+            InputError: the directory holds something already, belongs to another run, or cannot be made.
         """
         path = path or Path("runs") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
+        settings = asdict(config) if is_dataclass(config) and not isinstance(config, type) else config
+        told = {
+            "command": command,
+            "command_line": shlex.join(sys.argv),
+            "started": datetime.now().astimezone().isoformat(timespec="seconds"),
+            "seed": seed,
+            "config": settings,
+            "versions": versions(),
+        }
+        taken = InputError(f"{path} exists and is not an empty folder; name another with --out, or move it away")
         with explained(path):
             if path.exists() and (not path.is_dir() or any(path.iterdir())):
-                raise InputError(f"{path} exists and is not an empty folder; name another with --out, or move it away")
+                raise taken
             path.mkdir(parents=True, exist_ok=True)
-        run = cls(path)
-        settings = asdict(config) if is_dataclass(config) and not isinstance(config, type) else config
-        run.write_json(
-            "run.json",
-            {
-                "command": command,
-                "command_line": shlex.join(sys.argv),
-                "started": datetime.now().astimezone().isoformat(timespec="seconds"),
-                "seed": seed,
-                "config": settings,
-                "versions": versions(),
-            },
-        )
-        return run
+            about = path / "run.json"
+            try:
+                with about.open("x", encoding="utf-8") as file:  # of runs that begin at once one has the directory
+                    file.write(json.dumps(finite(told), indent=2, default=str) + "\n")
+            except FileExistsError:
+                raise taken from None
+            except BaseException:  # a signal too
+                about.unlink()
+                raise
+        return cls(path)
 
     def write_json(self, name: str, content: Any) -> Path:
         """Write a JSON file of the run."""
-        return write_text(self.path / name, json.dumps(content, indent=2, default=plain) + "\n")
+        return write_json(self.path / name, content)
 
     def read_json(self, name: str) -> Any:
         """Read a JSON file of the run.
@@ -75,10 +81,7 @@ class RunDirectory:
         Raises:
             InputError: it is missing or is not JSON.
         """
-        try:
-            return json.loads((self.path / name).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{self.path} is no run directory: cannot read {name} ({error})") from error
+        return read_json(self.path / name, hint="this is no run directory, name one")
 
 
 def versions() -> dict[str, str]:

@@ -5,22 +5,28 @@ Surrogate(1.9, wn=12.0, zeta=0.9, dead_time=0.008, motor="servo", axis="pitch")
 Surrogate.load("surrogate.json")                 # what `orient-eye sysid` wrote, or a shipped one by its name
 """
 
-import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from orient_eye.checks import real, shown
 from orient_eye.constants import ANGLES
 from orient_eye.errors import InputError
-from orient_eye.files import write_text
+from orient_eye.files import read_json, write_json
 from orient_eye.motor import Motor
-from orient_eye.resources import data_folder
+from orient_eye.resources import data_folder, printable, shipped_or_given
 
 _FORMATS = ("orient-eye surrogate 2", "orient-eye surrogate 1")
-_LARGEST_BYTES = 16 * 2**20
+_BOUNDS = {
+    "K": (-1e6, 1e6, "deg/deg"), "w0": (1e-3, 1e6, "rad/s"), "wn": (1e-3, 1e6, "rad/s"), "zeta": (1e-3, 1e3, ""),
+    "dead_time": (0.0, 10.0, "s"), "speed_limit": (1e-3, 1e9, "deg/s"), "acceleration_limit": (1e-3, 1e12, "deg/s^2"),
+}  # fmt: skip
+"""Of the numbers, with their units: none of an eye, an arm or a servo comes near."""
+RANGE_DEG = 1e6
+"""No motor goes farther."""
 
 
 @dataclass(frozen=True)
@@ -67,21 +73,20 @@ class Surrogate:
     rig: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
+        for name in _BOUNDS:
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, number(name, value))
         first, second = self.w0 is not None, self.wn is not None and self.zeta is not None
-        told = {name: getattr(self, name) for name in ("K", "w0", "wn", "zeta", "dead_time")}
-        if first == second or (self.wn is None) != (self.zeta is None):
-            raise InputError(f"a surrogate has w0, or wn and zeta, got {told}")
-        rates = [self.w0] if first else [self.wn, self.zeta]
-        if not (np.isfinite(self.K) and self.K != 0 and all(r is not None and 0 < r < np.inf for r in rates)):
-            raise InputError(f"a surrogate needs a finite gain K != 0 and positive w0, or wn and zeta, got {told}")
-        if not 0 <= self.dead_time < np.inf:
-            raise InputError(f"the dead time is not negative, got {self.dead_time} s")
+        if first == second or (self.wn is None) != (self.zeta is None) or abs(self.K) < 1e-6:
+            told = {name: getattr(self, name) for name in ("K", "w0", "wn", "zeta")}
+            raise InputError(f"a surrogate has a gain K of 1e-6 or more either way, and w0, or wn and zeta, got {told}")
+        check_kinds(self, {"motor": str, "source": str, "eye": str | None, "details": dict, "rig": Mapping | None})
         if self.axis not in ANGLES:
-            raise InputError(f"an axis is yaw, pitch or roll, got {self.axis!r}")
-        for name in ("range", "amplitudes"):
-            value = getattr(self, name)
-            object.__setattr__(self, name, None if value is None else (float(value[0]), float(value[1])))
-        intervals = {str(name): (float(ends[0]), float(ends[1])) for name, ends in dict(self.intervals).items()}
+            raise InputError(f"an axis is yaw, pitch or roll, got {shown(self.axis)}")
+        for name, largest in (("range", RANGE_DEG), ("amplitudes", np.inf)):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, ends(name, value, largest))
+        intervals = {str(name): ends(f"intervals, {name},", value) for name, value in dict(self.intervals).items()}
         object.__setattr__(self, "intervals", intervals)
         self.as_motor()  # which checks range and limits
 
@@ -98,7 +103,7 @@ class Surrogate:
 
     def save(self, path: str | Path) -> Path:
         """Write the JSON file."""
-        return write_text(path, json.dumps(self.to_plain(), indent=2) + "\n")
+        return write_json(path, self.to_plain())
 
     @classmethod
     def load(cls, path: str | Path) -> "Surrogate":
@@ -107,20 +112,74 @@ class Surrogate:
         Raises:
             InputError: missing, or not a surrogate.
         """
-        shipped = shipped_surrogates()
-        file = shipped.get(str(path), Path(path))
-        try:
-            if file.stat().st_size > _LARGEST_BYTES:
-                raise ValueError("it is larger than any surrogate")
-            content = json.loads(file.read_text(encoding="utf-8"))
-            if content.pop("format") not in _FORMATS:
-                raise ValueError(f"its format is not {_FORMATS[0]!r}")
-            return cls(**content)
-        except (OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise InputError(
-                f"{path} is no surrogate ({error}); give a surrogate.json written by orient-eye sysid, "
-                f"or a shipped one: {', '.join(shipped)}"
-            ) from error
+        return load(path, shipped_surrogates(), "surrogate", _FORMATS, lambda plain: cls(**plain), "orient-eye sysid")
+
+
+T = TypeVar("T")
+
+
+def load(
+    path: str | Path,
+    shipped: Mapping[str, Path],
+    kind: str,
+    formats: Sequence[str],
+    make: Callable[[dict[str, Any]], T],
+    writer: str,
+) -> T:
+    """Read a surrogate of some kind from its JSON file.
+
+    Args:
+        path: of the file, or the name of a shipped one.
+        shipped: files by name.
+        kind: what it is, for messages.
+        formats: that are read, the present one first.
+        make: makes it of the file's content without its format.
+        writer: the command that writes such files.
+
+    Raises:
+        InputError: there is none, or it is none.
+    """
+    hint = f"give the file of a {kind} written by {writer}, or a shipped one: {', '.join(shipped)}"
+    file = shipped_or_given(path, shipped, kind, hint)
+    content = read_json(file, hint=hint)
+    try:
+        if not isinstance(content, dict) or content.pop("format", None) not in formats:
+            raise ValueError(f"its format is not {formats[0]!r}")
+        return make(content)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{printable(path)} is no {kind} ({error}); {hint}") from error
+
+
+def check_kinds(described: object, kinds: Mapping[str, Any]) -> None:
+    """Refuse attributes that are of another kind; kinds by their name, as `isinstance` takes them.
+
+    Raises:
+        InputError: one is.
+    """
+    for name, kind in kinds.items():
+        if not isinstance(getattr(described, name), kind):
+            raise InputError(f"{name} is of the wrong kind, got {shown(getattr(described, name))}; leave it out")
+
+
+def number(name: str, value: Any) -> float:
+    """K, w0, wn, zeta, dead_time or a limit, finite and no less or more than any eye's.
+
+    Raises:
+        InputError: it is none.
+    """
+    low, high, unit = _BOUNDS[name]
+    return real(name, value, low, high, unit=unit)
+
+
+def ends(name: str, value: Any, largest: float = np.inf) -> tuple[float, float]:
+    """The two ends of a range or an interval.
+
+    Raises:
+        InputError: they are not two finite numbers, or one is larger, either way.
+    """
+    if not isinstance(value, Sequence) or len(value) != 2:
+        raise InputError(f"{name} is two numbers, its ends, got {shown(value)}")
+    return real(name, value[0], -largest, largest), real(name, value[1], -largest, largest)
 
 
 def shipped_surrogates() -> dict[str, Path]:

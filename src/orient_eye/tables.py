@@ -9,17 +9,26 @@ column is used.
 """
 
 import csv
+import io
 import math
+from array import array
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.checks import shown
 from orient_eye.errors import InputError
+from orient_eye.files import read_bytes, unreadable
 
 Array = NDArray[np.float64]
 _LARGEST_BYTES = 256 * 2**20
+_MOST_LINES, _LONGEST_LINE = 5_000_000, 100_000
+_LARGEST = 1e20  # of numbers: no measurement comes near, and no square or product of a few overflows
+_SHORTEST_S = 1e-9
 
 
 @dataclass(frozen=True)
@@ -43,14 +52,15 @@ class Table:
         """A column of finite numbers.
 
         Raises:
-            InputError: there is none, or a cell is no finite number.
+            InputError: there is none, or a cell is no finite number, or one beyond any measurement.
         """
         if name not in self.columns:
-            raise InputError(f"{self.path} has no column {name}; it has {', '.join(self.columns)}")
+            raise InputError(f"{self.path} has no column {name}; it has {listed(self.columns)}")
         column = self.columns[name]
-        bad = np.flatnonzero(~np.isfinite(column))
+        bad = np.flatnonzero(~(np.abs(column) <= _LARGEST))
         if bad.size:
-            raise InputError(f"{self.path}, line {self.lines[bad[0]]}: {name} is not a finite number; mend that row")
+            what = f"beyond {_LARGEST:g}" if np.isfinite(column[bad[0]]) else "not a finite number"
+            raise InputError(f"{self.path}, line {self.lines[bad[0]]}: {name} is {what}; mend that row")
         return column
 
     def stack(self, names: tuple[str, ...]) -> Array:
@@ -65,7 +75,7 @@ class Table:
         """
         time = self[name]
         change = np.diff(time)
-        falls = np.flatnonzero(change <= 0 if strictly else change < 0)
+        falls = np.flatnonzero(change < _SHORTEST_S if strictly else change < 0)
         if falls.size:
             k = int(falls[0])
             raise InputError(
@@ -82,17 +92,19 @@ def read_lines(path: str | Path) -> list[tuple[int, str]]:
     Raises:
         InputError: it cannot be read, or is larger than any table of ours.
     """
-    path = Path(path)
+    hint = "give a text file"
+    content = read_bytes(path, most=_LARGEST_BYTES, hint=hint)
     try:
-        with path.open("rb") as file:
-            content = file.read(_LARGEST_BYTES + 1)
-        if len(content) > _LARGEST_BYTES:
-            raise ValueError(f"it is larger than {_LARGEST_BYTES // 2**20} MB")
         text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read {path}: {error}; give a text file") from error
-    lines = enumerate(text.splitlines(), start=1)
-    return [(i, line) for i, line in lines if line.strip(" ") and not line.lstrip().startswith("#")]
+        kept = []
+        for number, line in enumerate(io.StringIO(text, newline=None), start=1):
+            if number > _MOST_LINES or len(line) > _LONGEST_LINE:
+                raise ValueError(f"it has more than {_MOST_LINES:,} lines, or one of {_LONGEST_LINE:,} characters")
+            if line.strip(" \n") and not line.lstrip().startswith("#"):
+                kept.append((number, line.removesuffix("\n")))
+    except ValueError as error:
+        raise unreadable(path, error, hint) from error
+    return kept
 
 
 def read_table(path: str | Path, example: str) -> Table:
@@ -118,11 +130,11 @@ def table_of(path: str | Path, lines: list[tuple[int, str]], example: str) -> Ta
     except csv.Error as error:
         raise InputError(f"{path} has no header that can be read ({error}); it needs {example}") from error
     if len(set(header)) != len(header):
-        raise InputError(f"{path}: a column stands twice in the header {', '.join(header)}; name each once")
+        raise InputError(f"{path}: a column stands twice in the header {listed(header)}; name each once")
     if all(_number(name, separator) is not None for name in header):
         raise InputError(f"{path} begins with numbers; its first line must name the columns: {example}")
     if len(lines) < 2:
-        raise InputError(f"{path} has no rows of numbers below its header; the header reads {', '.join(header)}")
+        raise InputError(f"{path} has no rows of numbers below its header; the header reads {listed(header)}")
     return numbers(path, tuple(header), lines[1:], separator)
 
 
@@ -132,20 +144,26 @@ def numbers(path: str | Path, header: tuple[str, ...], lines: list[tuple[int, st
     Raises:
         InputError: a row of another length, or a cell that is no number.
     """
-    values = np.empty((len(lines), len(header)))
-    for k, (line, text) in enumerate(lines):
+    values = array("d")
+    for line, text in lines:
         cells = text.split(separator)
         if len(cells) != len(header):
             raise InputError(
                 f"{path}, line {line}: {len(cells)} cells, but there are {len(header)} columns "
-                f"({', '.join(header)}); the file may be cut off there"
+                f"({listed(header)}); the file may be cut off there"
             )
         for j, cell in enumerate(cells):
             value = _number(cell, separator) if cell.strip() else math.nan
             if value is None:
-                raise InputError(f"{path}, line {line}: {header[j]} is {cell.strip()!r}, not a number")
-            values[k, j] = value
-    return Table(Path(path), dict(zip(header, values.T, strict=True)), tuple(line for line, _ in lines))
+                raise InputError(f"{path}, line {line}: {header[j]} is {shown(cell.strip())}, not a number")
+            values.append(value)
+    columns = np.array(values).reshape(-1, len(header)).T
+    return Table(Path(path), dict(zip(header, columns, strict=True)), tuple(line for line, _ in lines))
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names for a message, of many columns the first."""
+    return shorten(", ".join(names), 500, placeholder=" ...")
 
 
 def _number(cell: str, separator: str | None) -> float | None:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.checks import likely_milliseconds
 from orient_eye.commands import path_energy
 from orient_eye.constants import LONGEST_S
 from orient_eye.errors import InputError
@@ -220,6 +221,8 @@ def read_command(
             f"{path}: a command lasts up to one hour, this one {lasts:g} s; t_s is in s, and what is held for a while "
             "stands in two rows"
         )
+    if asked := likely_milliseconds(len(time), lasts):
+        raise InputError(f"{path}: {asked}")
     in_rigs = wiring is not None and (set(wiring.needed) & set(table.columns) or not set(own) & set(table.columns))
     positions = _drivers(path, table, wiring) if wiring is not None and in_rigs else _plants(path, table, own)
     return WrittenCommand(time - time[0], positions)

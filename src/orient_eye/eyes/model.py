@@ -7,6 +7,7 @@ Constants are read from the compiled model, never written a second time.
 """
 
 import hashlib
+import os
 from pathlib import Path
 
 import mujoco
@@ -15,16 +16,28 @@ from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
 from orient_eye.eyes import EYES
+from orient_eye.files import read_bytes, unreadable
 from orient_eye.motor import Motor
-from orient_eye.resources import data_folder
+from orient_eye.resources import data_folder, printable
 
 Array = NDArray[np.float64]
+_LARGEST_BYTES = 16 * 2**20
 STANDARD_GRAVITY = 9.81
 """m/s^2, as in the thesis author's simulator."""
 WORKING_RANGE_DEG = 40.0
 """Where a policy may send a motor of the elastic eye: 61.8 deg of yaw. The straight tendons run inside the
 eyeball already at small angles, and past about 50 deg of motor the response bends over; targets within 35 deg
 of yaw need 23.5."""
+
+
+def _tell_only_the_console() -> None:
+    """Of strange models and unstable steps: MuJoCo's own choice is a log in the working folder as well."""
+    config = mujoco.MjLogConfig.get()
+    config.logto_file = False
+    config.set()
+
+
+_tell_only_the_console()
 
 
 def build_model(
@@ -46,13 +59,18 @@ def build_model(
     """
     spec = load_spec(eye)
     try:
-        longest = 2 * min(_inertia_diagonal(spec)) / float(spec.joint("eye").damping[0])
+        inertia, friction = min(_inertia_diagonal(spec)), float(_joint(spec, "eye").damping[0])
+        if not (0 < inertia < np.inf and 0 < friction < np.inf):
+            raise ValueError(f"it has inertia {inertia:g} and friction {friction:g}, not both above 0")
+        longest = 2 * inertia / friction
         if not 0 < step_s < longest:
             raise InputError(f"the integration step must be between 0 and {longest:.2g} s, got {step_s} s")
         spec.option.timestep = step_s
         for motor in spec.actuators:
             # An arm stands where its control says one step later: `eye3.xml` has the reason.
-            armature, gear = float(spec.joint(motor.target).armature), motor.gear[0]
+            armature, gear = float(_joint(spec, motor.target).armature), float(motor.gear[0])
+            if not (0 < armature < np.inf and 0 < abs(gear) < np.inf):
+                raise ValueError(f"motor {motor.name!r} has armature {armature:g} and gear {gear:g}, not both above 0")
             motor.gainprm[0] = armature / (gear * step_s) ** 2
             motor.biasprm[1:3] = [-motor.gainprm[0], -motor.gainprm[0] * step_s]
         if gravity:
@@ -94,14 +112,18 @@ def load_spec(eye: str) -> mujoco.MjSpec:
 
 
 def _read(file: Path) -> mujoco.MjSpec:
+    hint = "give an MJCF file (CONTRIBUTING.md, add an eye), with its meshes beside it"
+    if not os.path.isfile(file):  # a pipe has nothing beside it
+        raise InputError(f"{printable(file)} is no eye: there is no such file; {hint}")
+    read_bytes(file, most=_LARGEST_BYTES, hint=hint)
     try:
         return mujoco.MjSpec.from_file(str(file))
-    except (ValueError, OSError) as error:
-        raise InputError(f"cannot read the eye {file}: {error}") from error
+    except ValueError as error:
+        raise unreadable(file, error, hint) from error
 
 
 def _check_parts(model: mujoco.MjModel) -> None:
-    """Everything that a plant asks for by name is there: KeyError otherwise."""
+    """Raise KeyError unless all is there that a plant asks for, ValueError unless it moves, by finite numbers."""
     for name in ("orientation", "angular_velocity"):
         model.sensor(name)
     for i in range(model.ntendon):
@@ -109,10 +131,22 @@ def _check_parts(model: mujoco.MjModel) -> None:
     model.site("gaze"), model.site("centre_of_mass"), model.body("eye")
     if not motors(model):
         raise ValueError("it has no motor: no actuator of a joint")
+    endless = [name for name in _PHYSICS if not np.isfinite(getattr(model, name)).all()]
+    if endless:
+        raise ValueError(f"it holds NaN or infinity: {', '.join(endless)}")
+
+
+def _joint(spec: mujoco.MjSpec, name: str) -> mujoco.MjsJoint:
+    joint = spec.joint(name)
+    if joint is None:
+        raise ValueError(f"it has no joint {name!r}")
+    return joint
 
 
 def _inertia_diagonal(spec: mujoco.MjSpec) -> list[float]:
     eye = spec.body("eye")
+    if eye is None:
+        raise ValueError("it has no body 'eye'")
     return [float(x) for x in (eye.fullinertia[:3] if np.isfinite(eye.fullinertia[0]) else eye.inertia)]
 
 

@@ -12,20 +12,20 @@ no code. The format of the file is in docs/policies.md.
 
 import json
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import safetensors
 import safetensors.numpy
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.files import digest, read_arrays, write_atomically
+from orient_eye.files import digest, finite, parse_json, read_arrays, write_atomically
 from orient_eye.learning.features import GAZE_INPUTS, QUATERNION_INPUTS, gaze_features
 from orient_eye.plants import Plant
-from orient_eye.resources import data_folder
+from orient_eye.resources import data_folder, printable, shipped_or_given
 from orient_eye.task.actions import scale
 from orient_eye.task.saccade import SaccadeTask
 from orient_eye.words import in_words, plant_in_words
@@ -197,7 +197,7 @@ class Policy:
         arrays: dict[str, NDArray[Any]] = {f"weight{i}": w.astype(np.float32) for i, w in enumerate(self.weights)}
         arrays |= {f"bias{i}": b.astype(np.float32) for i, b in enumerate(self.biases)}
         arrays |= {"low": self.low, "high": self.high, "log": self.log}
-        manifest = _finite(self.manifest)
+        manifest = finite(self.manifest)
         head = {"format": _FORMAT, "sha256": digest(arrays, manifest), **manifest}
         metadata = {_METADATA: json.dumps(head, indent=1, allow_nan=False)}
         content = safetensors.numpy.save(arrays, metadata)
@@ -211,30 +211,40 @@ class Policy:
             InputError: it is missing, damaged, or of another format.
         """
         shipped = shipped_policies()
-        file = shipped.get(str(path), Path(path))
-        if file.name not in (NAME, _OLD_NAME):
-            file = file / NAME
-        try:
-            if not file.with_name(NAME).exists() and file.with_name(_OLD_NAME).exists():
-                raise ValueError(
+        hint = (
+            f"give a run directory of orient-eye train, a folder with a {NAME}, or the name of a shipped policy: "
+            f"{', '.join(shipped) or '(none)'}"
+        )
+        place = shipped_or_given(path, shipped, "policy", hint)
+        folder = place.parent if place.name in (NAME, _OLD_NAME) else place
+        file, old = folder / NAME, folder / _OLD_NAME
+        if not os.path.exists(file):
+            told = f"there is no {printable(file)}; {hint}"
+            if os.path.exists(old):
+                told = (
                     f"it is of format 1 ({_OLD_NAME} and policy.npz), which orient-eye 0.1 wrote and this version does "
                     "not read; train it again, or use it with that version"
                 )
-            policy = cls(*_read(file.with_name(NAME)))
-            task = policy.manifest["task"]
-            if not all(isinstance(part, dict) for part in (task, task["plant"], policy.manifest.get("result", {}))):
-                raise ValueError("its task, plant or result is not an object")
-            bounds = task["actions"]["low"], task["actions"]["high"]
-            if bounds != (policy.low.tolist(), policy.high.tolist()):
-                raise ValueError("the bounds in its manifest are not those in its arrays")
-        except (OSError, KeyError, TypeError, ValueError, MemoryError, RecursionError, AttributeError) as error:
-            missing = isinstance(error, FileNotFoundError)
-            reason = f"there is no {file}" if missing else _reason(error)
-            raise InputError(
-                f"{path} is no policy: {reason}. Give a run directory of orient-eye train, a folder with a {NAME}, "
-                f"or the name of a shipped policy: {', '.join(shipped) or '(none)'}"
-            ) from error
+            raise InputError(f"{printable(path)} is no policy: {told}")
+        arrays, metadata = read_arrays(file, most=_LARGEST_BYTES, hint=hint)
+        try:
+            manifest = _manifest(arrays, metadata)
+            policy = cls(*_layers(arrays), manifest=manifest)
+            policy._check_manifest()
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"{printable(path)} is no policy: {_reason(error)}; {hint}") from error
         return policy
+
+    def _check_manifest(self) -> None:
+        """Raise KeyError, TypeError or ValueError unless it says what everybody asks it."""
+        task, numbers = self.manifest["task"], self.manifest["numbers"]
+        if not all(isinstance(part, dict) for part in (task, task["plant"], self.manifest.get("result", {}))):
+            raise ValueError("its task, plant or result is not an object")
+        if (task["actions"]["low"], task["actions"]["high"]) != (self.low.tolist(), self.high.tolist()):
+            raise ValueError("the bounds in its manifest are not those in its arrays")
+        named = [isinstance(number["name"], str) and isinstance(number["unit"], str) for number in numbers]
+        if named != [True] * self.low.size:
+            raise ValueError(f"it gives {self.low.size} numbers, but not as many names and units")
 
 
 def shipped_policies() -> dict[str, Path]:
@@ -296,31 +306,21 @@ def _parts(identity: dict[str, Any], skip: str) -> dict[tuple[str, str], Any]:
     return found
 
 
-def _read(file: Path) -> tuple[tuple[Array, ...], tuple[Array, ...], Array, Array, NDArray[np.bool_], dict[str, Any]]:
-    """What `Policy` is made of, if the file is whole."""
-    if file.stat().st_size > _LARGEST_BYTES:
-        raise ValueError(f"{file.name} is larger than any policy")
-    try:
-        arrays, metadata = read_arrays(file)
-    except safetensors.SafetensorError as error:
-        raise ValueError(f"{file.name} is damaged, or no safetensors file ({error})") from error
-    manifest = json.loads(metadata.get(_METADATA) or "{}")
-    if not isinstance(manifest, dict) or manifest.pop("format", None) != _FORMAT:
-        raise ValueError(f"{file.name} is not of the format {_FORMAT!r}")
-    if manifest.pop("sha256") != digest(arrays, manifest):
-        raise ValueError(f"{file.name} is damaged: its SHA-256 differs")
+def _layers(arrays: dict[str, NDArray[Any]]) -> tuple[tuple[Array, ...], tuple[Array, ...], Array, Array, Any]:
+    """Weights, biases, low, high and log of a policy."""
     layers = sum(name.startswith("weight") for name in arrays)
     weights, biases = (tuple(arrays[f"{kind}{i}"].astype(float) for i in range(layers)) for kind in ("weight", "bias"))
-    return weights, biases, arrays["low"].astype(float), arrays["high"].astype(float), arrays["log"] != 0, manifest
+    return weights, biases, arrays["low"].astype(float), arrays["high"].astype(float), arrays["log"] != 0
 
 
-def _finite(value: Any) -> Any:
-    """The same plain value with None for numbers that JSON does not have."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def _manifest(arrays: dict[str, NDArray[Any]], metadata: dict[str, str]) -> dict[str, Any]:
+    """The manifest in a file's metadata, if the file is whole."""
+    manifest = parse_json(metadata.get(_METADATA) or "{}")
+    if not isinstance(manifest, dict) or manifest.pop("format", None) != _FORMAT:
+        raise ValueError(f"it is not of the format {_FORMAT!r}")
+    if manifest.pop("sha256") != digest(arrays, manifest):
+        raise ValueError("it is damaged: its SHA-256 differs")
+    return manifest
 
 
 def _reason(error: Exception) -> str:

@@ -9,6 +9,7 @@ pickles: `SAC.load` runs the code of whoever wrote it, so load only files of peo
 `import_sb3` reads nothing but the tensors, which runs no code.
 """
 
+import io
 import json
 import zipfile
 from pathlib import Path
@@ -17,9 +18,10 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from orient_eye.errors import InputError
-from orient_eye.files import write_atomically
+from orient_eye.files import parse_json, read_bytes, write_atomically
 from orient_eye.learning.features import GAZE_INPUTS, UNIT_DEG
 from orient_eye.learning.policy import Policy
+from orient_eye.resources import printable
 from orient_eye.run_directory import versions
 from orient_eye.task.saccade import SaccadeTask
 
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     import onnx
 
 _OPSET, _IR_VERSION = 17, 8  # read by onnxruntime 1.13 and later
+_LARGEST_BYTES = 2**28  # of a zip, and of what is in it
 _NO_SPREAD = -20.0  # log of the standard deviation, SB3's least
 
 
@@ -208,12 +211,18 @@ def import_sb3(path: str | Path, task: SaccadeTask) -> Policy:
     """
     import torch
 
+    hint = "give a zip that SAC's save wrote"
+    content = read_bytes(path, most=_LARGEST_BYTES, hint=hint)
     try:
-        with zipfile.ZipFile(path) as archive:
-            words = json.loads(archive.read("data"))
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
+                raise ValueError(f"it unpacks to more than {_LARGEST_BYTES // 2**20} MB")
+            words = parse_json(archive.read("data"))
             with archive.open("policy.pth") as file:
                 state = torch.load(file, map_location="cpu", weights_only=True)
         actor = {key.removeprefix("actor."): value for key, value in state.items() if key.startswith("actor.")}
+        if sum(value.numel() for value in actor.values()) > _LARGEST_BYTES:  # which few bytes can repeat
+            raise ValueError("its networks are larger than any policy's")
         _refuse_other_networks(words, actor)
         hidden = sorted({key.split(".")[1] for key in actor if key.startswith("latent_pi.")}, key=int)
         layers = [f"latent_pi.{i}" for i in hidden] + ["mu"]
@@ -222,7 +231,7 @@ def import_sb3(path: str | Path, task: SaccadeTask) -> Policy:
     except Exception as error:  # whatever a stranger's file makes zipfile, json and torch raise
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{path} is no zip of a Stable-Baselines3 SAC: {error}") from error
+        raise InputError(f"{printable(path)} is no zip of a Stable-Baselines3 SAC: {error}; {hint}") from error
     source = f"imported from the Stable-Baselines3 zip {Path(path).name}"
     return Policy.of_task(task, weights, biases, case=None, config={}, versions=versions(), result={}, source=source)
 

@@ -7,8 +7,8 @@
 The .npz is the durable record: arrays named as the attributes, and nothing that needs pickle.
 """
 
+import io
 import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -18,11 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.constants import LONGEST_S
 from orient_eye.errors import InputError
-from orient_eye.files import write_atomically
+from orient_eye.files import read_bytes, write_atomically
 from orient_eye.motor import Motor, names
+from orient_eye.resources import printable
 
 Array = NDArray[np.float64]
+_LARGEST_BYTES = 2**31
+_LARGEST = 1e20  # of numbers, as in tables
 
 
 @dataclass(frozen=True)
@@ -103,15 +107,38 @@ class Trajectory:
         Raises:
             InputError: the file is missing or is not a trajectory.
         """
+        hint = "give an .npz file that orient-eye wrote"
+        content = read_bytes(path, most=_LARGEST_BYTES, hint=hint)
         try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays: dict[str, Any] = dict(file)
+            arrays = _unpacked(content)
             tendons = tuple(map(str, arrays.pop("tendon_names")))
             described = zip(arrays.pop("motor_names"), arrays.pop("motor_units"), strict=True)
             motors = tuple(Motor(str(name), str(unit)) for name, unit in described)
-            return cls(tension=arrays.pop("tension", None), **arrays, motors=motors, tendon_names=tendons)
-        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
-            raise InputError(f"{path} is not a trajectory file (.npz written by orient-eye): {error}") from error
+            read = cls(tension=arrays.pop("tension", None), **arrays, motors=motors, tendon_names=tendons)
+            read._check()
+        except Exception as error:  # whatever a stranger's file makes zipfile and NumPy raise
+            raise InputError(f"{printable(path)} is not a trajectory file: {error}; {hint}") from error
+        return read
+
+    def _check(self) -> None:
+        """Raise InputError unless shapes fit, time rises from 0, and saccades that did not fail are finite numbers."""
+        count, samples, motors, tendons = len(self.failed), len(self.time), len(self.motors), len(self.tendon_names)
+        rows = {"orientation": 4, "angular_velocity": 3, "command": motors, "motor": motors}
+        if self.tension is not None:
+            rows["tension"] = tendons
+        wanted: dict[str, tuple[int, ...]] = {"time": (samples,), "failed": (count,)}
+        wanted |= {name: (count, samples, width) for name, width in rows.items()}
+        for name, shape in wanted.items():
+            array, kind = getattr(self, name), bool if name == "failed" else float
+            if (array.shape, array.dtype) != (shape, kind):
+                raise InputError(f"{name} has shape {shape}, {kind.__name__}, got {array.shape}, {array.dtype}")
+        if not (samples and self.time[0] == 0 and (np.diff(self.time) >= 1e-9).all() and self.time[-1] <= LONGEST_S):
+            raise InputError(f"time rises from 0 to {LONGEST_S:g} s at most")
+        for name in rows:
+            if not (np.abs(getattr(self, name)[~self.failed]) <= _LARGEST).all():
+                raise InputError(f"{name} holds finite numbers, up to {_LARGEST:g}, but for failed saccades")
+        if (np.abs(np.linalg.norm(self.orientation[~self.failed], axis=-1) - 1) > 0.01).any():
+            raise InputError("orientation holds unit quaternions")
 
     def to_csv(self, path: str | Path) -> Path:
         """Write a batch of one as a table, one row a sample.
@@ -140,6 +167,19 @@ class Trajectory:
                 temporary, np.column_stack(data), fmt="%.9g", delimiter=",", header=",".join(columns), comments=""
             ),
         )
+
+
+def _unpacked(content: bytes) -> dict[str, Any]:
+    """Arrays of an .npz file, whose archive may promise more than any of ours holds.
+
+    Raises:
+        Exception: whatever it makes zipfile and NumPy raise.
+    """
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
+            raise ValueError(f"it unpacks to more than {_LARGEST_BYTES // 2**20} MB")
+    with np.load(io.BytesIO(content), allow_pickle=False) as file:
+        return dict(file)
 
 
 _ROWS = ("orientation", "angular_velocity", "command", "motor", "tension", "failed")

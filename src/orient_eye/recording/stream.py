@@ -1,5 +1,6 @@
 """What every recording has in common: how it is written, whole or not at all."""
 
+import errno
 import zlib
 from collections.abc import Callable, Sized
 from pathlib import Path
@@ -13,6 +14,9 @@ from orient_eye.files import write_atomically
 
 if TYPE_CHECKING:
     import rerun as rr
+
+_BEGINNING, _END = b"RRF2", b"RRF2FOOT"
+_FOOTER = slice(-12, -4)  # behind it stands how many there are
 
 
 def check(path: Path, saccades: int, target: NDArray[np.float64] | None, **others: Sized | None) -> None:
@@ -51,7 +55,15 @@ def write(path: Path, layout: object, draw: "Callable[[rr.RecordingStream], None
     """
     # The viewer keeps what a person changed in the layout of an application: one application for each layout.
     application = f"orient-eye-{zlib.crc32(repr(layout).encode()):08x}"
-    return write_atomically(path, lambda file: file.write_bytes(_recorded(application, path.stem, draw)))
+    return write_atomically(path, lambda file: _fill(file, _recorded(application, path.stem, draw)))
+
+
+def _fill(file: Path, recording: bytes) -> None:
+    """Write a file, and raise OSError unless it holds all of it, from a recording's first bytes to its footer."""
+    file.write_bytes(recording)
+    there = file.read_bytes()
+    if there != recording or not there.startswith(_BEGINNING) or there[_FOOTER] != _END:
+        raise OSError(errno.EIO, "the recording came out damaged")
 
 
 def draw_info(rec: "rr.RecordingStream", text: str) -> None:

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from platformdirs import user_cache_path
 
 from orient_eye.errors import InputError
+from orient_eye.resources import user_cache
 from orient_eye.search.optimum import Optimum, find_optimum
 from orient_eye.search.optimum_file import Found, read_optimum, write_optimum
 from orient_eye.state import State
@@ -35,8 +35,8 @@ _STILL = 1e-4  # of |R|: as far as a reward may be from the one in a file that t
 
 
 def cache_folder() -> Path:
-    """Where optima are kept: the user's cache folder (the variable XDG_CACHE_HOME moves it)."""
-    return user_cache_path("orient-eye") / "optimum"
+    """Where optima are kept: in the user's cache folder."""
+    return user_cache("optimum")
 
 
 def task_key(task: SaccadeTask) -> str:
@@ -75,7 +75,7 @@ def searched_optimum(
     }
     path = (folder or cache_folder()) / f"{_hash(key)[:24]}.safetensors"
     kept = read_optimum(path)
-    if kept is not None:
+    if kept is not None and kept.optimum.action.shape == (len(target), len(task.actions.numbers)):
         return kept.optimum
     found = find_optimum(task, start, target, np.random.default_rng(_SEED), progress=progress)
     with contextlib.suppress(InputError):  # a folder that cannot be written costs the next search, nothing else

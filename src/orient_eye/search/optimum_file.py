@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from orient_eye.files import digest, read_arrays, write_atomically
+from orient_eye.checks import whole
+from orient_eye.files import digest, parse_json, read_arrays, write_atomically
 from orient_eye.search.optimum import Optimum
 from orient_eye.state import State
 
@@ -84,16 +84,18 @@ def write_optimum(path: Path, found: Found) -> Path:
 def read_optimum(path: Path) -> Found | None:
     """Read a file; None where there is none, or one that is damaged or of another format."""
     try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            return None
-        arrays, metadata = read_arrays(path)
-        told = json.loads(metadata[_METADATA])
+        arrays, metadata = read_arrays(path, most=_LARGEST_BYTES, hint="search it again")
+        told = parse_json(metadata[_METADATA])
         if told.pop("sha256") != digest(arrays, told) or told["format"] != _FORMAT:
             return None
-        if len({len(array) for array in arrays.values()}) != 1:
+        if not all(array.dtype == float and np.isfinite(array).all() for array in arrays.values()):
             return None
+        action, reward, target = (arrays[name] for name in ("action", "reward", "target"))
         start = State(*(arrays[name] for name in ("orientation", "motor", "angular_velocity")))
-        optimum = Optimum(arrays["action"], arrays["reward"], int(told["evaluations"]))
-        return Found(str(told["key"]), start, arrays["target"], optimum)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, safetensors.SafetensorError):
+        count = len(start)
+        if (len(action), action.ndim, reward.shape, target.shape) != (count, 2, (count,), (count, 4)):
+            return None
+        optimum = Optimum(action, reward, whole("evaluations", told["evaluations"], 0))
+        return Found(str(told["key"]), start, target, optimum)
+    except (ValueError, KeyError, TypeError, AttributeError):
         return None  # an InputError is a ValueError

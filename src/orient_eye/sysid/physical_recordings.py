@@ -17,10 +17,11 @@ from orient_eye.motor import Motor
 from orient_eye.rig import Rig
 from orient_eye.rotations import rotation, to_euler
 from orient_eye.sysid import prototype_log
-from orient_eye.sysid.recordings import MIN_ROWS, read_recording
+from orient_eye.sysid.recordings import MIN_ROWS, log_of, refuse_twice
 from orient_eye.tables import read_lines, table_of
 
 Array = NDArray[np.float64]
+_STANDS_DEG = 1e-9  # less is no movement
 _QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 
 
@@ -74,10 +75,7 @@ def read_recordings(
     Raises:
         InputError: also when a file is named twice, or fewer than 8 rows are left.
     """
-    resolved = [Path(path).resolve() for path in paths]
-    for path in resolved:
-        if resolved.count(path) > 1:
-            raise InputError(f"{path.name} is named twice; a recording counts once")
+    refuse_twice(paths)
     eye_motors = motors(build_model(eye, visual=False))
     read = tuple(read_physical(Path(path), eye_motors, row_times, rig) for path in paths)
     return read if until is None else tuple(each.until(until) for each in read)
@@ -100,7 +98,7 @@ def read_physical(path: Path, eye_motors: Sequence[Motor], row_times: str = "eve
     """
     lines = read_lines(path)
     if lines and prototype_log.recognised(lines[0][1]):
-        step = read_recording(path, row_times=row_times)
+        step, _ = log_of(path, lines, row_times=row_times)
         if step.orientation is None or any(motor.name not in step.motors for motor in eye_motors):
             raise InputError(f"{path}: the prototype has motor1, motor2 and motor3, this eye has others; give a table")
         driven = np.stack([step.motors[motor.name] for motor in eye_motors], axis=-1)
@@ -116,7 +114,7 @@ def read_physical(path: Path, eye_motors: Sequence[Motor], row_times: str = "eve
         if columns[each.name] in table:
             told = table[columns[each.name]]
             motor[:, i] = spoken[each.name].from_driver(told) if each.name in spoken else told
-    if not np.ptp(motor, axis=0).any():
+    if (np.ptp(motor, axis=0) < _STANDS_DEG).all():
         raise InputError(
             f"{path}: no motor of this eye moves; its columns are {', '.join(columns.values())}, the file has "
             f"{', '.join(table.columns)}"

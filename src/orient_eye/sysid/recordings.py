@@ -7,6 +7,7 @@ The formats are described in docs/sysid.md. A log of the prototype is recognised
 13 columns separated by blanks, no header (see `prototype_log.py`).
 """
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 MIN_ROWS = 8
 _EXAMPLE = "t_s,motor_deg,eye_deg"
 _QUATERNION = ("q_w", "q_x", "q_y", "q_z")
+_STANDS_DEG = 1e-9  # less is no movement
 _STARTED = 0.005  # of the motor's way: then it has begun to move
 
 
@@ -51,10 +53,7 @@ def read_recordings(
     Raises:
         InputError: also when a file is named twice, or fewer than 8 rows are left.
     """
-    resolved = [path.resolve() for path in paths]
-    for path in resolved:
-        if resolved.count(path) > 1:
-            raise InputError(f"{path.name} is named twice; a recording counts once")
+    refuse_twice(paths)
     steps = tuple(read_recording(path, motor, axis, row_times, rig) for path in paths)
     if until is None:
         return steps
@@ -66,6 +65,14 @@ def read_recordings(
                 "moves: name a later time"
             )
     return tuple(step.until(until) for step in steps)
+
+
+def refuse_twice(paths: Sequence[Path]) -> None:
+    """Raise InputError where a file is named twice, by any names."""
+    there = [os.path.realpath(path) for path in paths if os.path.exists(path)]
+    for path in there:
+        if there.count(path) > 1:
+            raise InputError(f"{os.path.basename(path)} is named twice; a recording counts once")
 
 
 def read_recording(
@@ -94,14 +101,26 @@ def read_recording(
         raise InputError(f"the rig {rig.name!r} says what drives the eye; leave the motor {motor!r} out")
     lines = read_lines(path)
     if lines and prototype_log.recognised(lines[0][1]):
-        table = _long_enough(numbers(path, prototype_log.COLUMNS, lines, None))
-        step = prototype_log.step_response(Path(path).name, table.stack(prototype_log.COLUMNS), axis, row_times)
+        step, table = log_of(path, lines, axis, row_times)
         step = step if rig is None else prototype_log.in_the_rigs_sense(step, table, rig, axis)
     else:
         step = _from_table(_long_enough(table_of(path, lines, _EXAMPLE)), motor, axis, rig)
-    if float(np.ptp(step.motor_deg)) == 0:
+    return _moving(step)
+
+
+def log_of(
+    path: Path, lines: list[tuple[int, str]], axis: str | None = None, row_times: str = "even"
+) -> tuple[StepResponse, Table]:
+    """The step response of a prototype log's lines, and its table; arguments and errors as `read_recording`'s."""
+    table = _long_enough(numbers(path, prototype_log.COLUMNS, lines, None))
+    step = prototype_log.step_response(Path(path).name, table.stack(prototype_log.COLUMNS), axis, row_times)
+    return _moving(step), table
+
+
+def _moving(step: StepResponse) -> StepResponse:
+    if np.ptp(step.motor_deg) < _STANDS_DEG:
         raise InputError(
-            f"{path}: the motor does not move, so nothing can be identified; the recording must begin at rest, "
+            f"{step.name}: the motor does not move, so nothing can be identified; the recording must begin at rest, "
             "before the step"
         )
     return step

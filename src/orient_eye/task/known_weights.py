@@ -25,12 +25,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from platformdirs import user_cache_path
 
 from orient_eye.errors import InputError
-from orient_eye.files import write_text
+from orient_eye.files import read_json, write_json
 from orient_eye.plants.fixation import knows_elastics
-from orient_eye.resources import data_folder
+from orient_eye.resources import data_folder, user_cache
 from orient_eye.task.actions import B_RANGE, K0_RANGE, PulseStepActions
 from orient_eye.task.judge import JUDGES
 from orient_eye.task.solved_weights import ChosenSaccade, Resolved, Steps, action_of, resolve, solve_at, told
@@ -69,19 +68,19 @@ def with_known_weights(task: SaccadeTask) -> SaccadeTask:
         InputError: the plant makes no saccade by which weights could be set.
     """
     shipped = _key(task)  # which hold for any horizon and range
-    for entry in json.loads((data_folder("models") / "weights.json").read_text(encoding="utf-8")):
+    for entry in _shipped():
         if entry["of"] == shipped:
             return replace(task, weights=entry["weights"], weights_from=entry["from"])
     identity = task.identity()
     key = {**identity, "weights": None, "rule": _RULE, "version": metadata.version("orient-eye")}
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
-    file = user_cache_path("orient-eye") / "weights" / f"{name}.json"
+    file = user_cache("weights") / f"{name}.json"
     kept = _read(file, key)
     if kept is None:
         weights, where = solve(task)
         kept = {"of": key, "weights": weights, "from": where}
         with contextlib.suppress(InputError):  # a folder that cannot be written costs the next solution, nothing else
-            write_text(file, json.dumps(kept, indent=2) + "\n")
+            write_json(file, kept)
     return replace(task, weights=kept["weights"], weights_from=kept["from"])
 
 
@@ -231,7 +230,7 @@ def compared_with_thesis(task: SaccadeTask) -> str:
     differ = [s for s, ends in of_thesis.items() if any(symbol == s and (lo, hi) != ends for symbol, lo, hi in own)]
     told = [f"{s} from {of_thesis[s][0]:g} to {of_thesis[s][1]:g} 1/s" for s in differ]
     actions = task.actions.plain.identity()
-    for entry in json.loads((data_folder("models") / "weights.json").read_text(encoding="utf-8")):
+    for entry in _shipped():
         key = entry["of"]
         same = all(key["actions"].get(name) == actions.get(name) for name in ("actions", "pulse", "C"))
         if key["plant"]["plant"] == "lpf" and same and (key["judge"], key["band"]) == (task.judge, task.band):
@@ -253,7 +252,13 @@ def _key(task: SaccadeTask) -> dict[str, Any]:
 
 def _read(file: Path, key: dict[str, Any]) -> dict[str, Any] | None:
     try:
-        kept: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        return kept if kept["of"] == key and isinstance(kept["from"], str) and kept["weights"] else None
-    except (OSError, ValueError, KeyError, TypeError):  # none, or damaged: solve again
+        kept: dict[str, Any] = read_json(file, hint="solve them again")
+        kept["weights"] = JUDGES[key["judge"]].weights(kept["weights"])
+        return kept if kept["of"] == key and isinstance(kept["from"], str) else None
+    except (ValueError, KeyError, TypeError, AttributeError):  # none, or damaged: solve again
         return None
+
+
+def _shipped() -> list[dict[str, Any]]:
+    shipped: list[dict[str, Any]] = read_json(data_folder("models") / "weights.json", hint="install orient-eye again")
+    return shipped
