@@ -70,7 +70,7 @@ def test_killed_and_resumed_is_the_run_never_stopped(
     command = [sys.executable, "-c", PROGRAM, str(stopped), surrogate, "0.05", "robust"]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
-    while not (stopped / "checkpoint.pt").exists() and time.monotonic() < deadline:
+    while not (stopped / "checkpoint.safetensors").exists() and time.monotonic() < deadline:
         time.sleep(0.005)
     process.send_signal(how)
     assert process.wait(60) == code

@@ -7,6 +7,7 @@ Their docstrings are the help of `orient-eye train`.
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from orient_eye.checks import real, shown, whole
 from orient_eye.constants import BAND, DOUBT
 from orient_eye.errors import InputError
 
@@ -55,15 +57,24 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 FINE_TUNING: dict[str, Any] = {"updates": 4000, "warmup": 512, "temperature": (1e-3, 3e-4), "learning_rate": 1e-3}
 """What differs where a run begins with a policy."""
-_LARGEST = {
-    "updates": 10**9,
-    "updates_per_rollout": 10**4,
-    "saccades_per_update": 10**5,
-    "batch_size": 10**6,
-    "replay_size": 10**8,
-    "warmup": 10**8,
-    "evaluation_pairs": 10**5,
+_WHOLE = {
+    "updates": (1, 10**8),
+    "updates_per_rollout": (1, 10**4),
+    "saccades_per_update": (1, 10**5),
+    "batch_size": (1, 10**5),  # 0.7 GB
+    "replay_size": (1, 10**7),  # 0.5 GB
+    "warmup": (1, 10**7),
+    "evaluation_pairs": (1, 10**4),
+    "seed": (0, 2**63 - 1),
 }
+_REAL = {
+    "learning_rate": (1e-12, 1.0),
+    "last_learning_rate": (0.0, 1.0),
+    "second_moment": (0.0, 1 - 1e-9),
+    "doubt": (1e-12, 0.5),
+}
+_ROLLOUT = 10**5  # saccades performed at once: 0.6 GB on a simulated eye
+_TEMPERATURE = 1e-12, 1e6
 
 
 @dataclass(frozen=True)
@@ -202,7 +213,7 @@ class TrainConfig:
             **(FINE_TUNING if self.origin is not None and self.preset == "ours" else {}),
             **{name: getattr(self, name) for name in shared if getattr(self, name) is not None},
         }
-        if self.updates_per_rollout is None and _whole(values["updates"]):
+        if self.updates_per_rollout is None and isinstance(values["updates"], int):
             values["updates_per_rollout"] = math.gcd(values["updates"], values["updates_per_rollout"])
         path = None if self.origin is None else Path(self.origin)  # else the name of a shipped policy
         values["origin"] = str(path.resolve()) if path is not None and path.exists() else self.origin or ""
@@ -250,34 +261,40 @@ class TrainSettings:
     robust: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, largest in _LARGEST.items():
-            value = getattr(self, name)
-            _require(_whole(value) and 1 <= value <= largest, name, f"a whole number from 1 to {largest}", value)
+        for name, (least, most) in _WHOLE.items():
+            whole(name.replace("_", " "), getattr(self, name), least, most)
+        for name, (low, high) in _REAL.items():
+            real(name.replace("_", " "), getattr(self, name), low, high)
+        for name in ("case", "origin", "weights_from"):
+            _require(isinstance(getattr(self, name), str), name.replace("_", " "), "words", getattr(self, name))
+        whole("updates per rollout x saccades per update", self.saccades_per_rollout, 1, _ROLLOUT)
         words = f"a number that divides the {self.updates} updates"
-        _require(self.updates % self.updates_per_rollout == 0, "updates_per_rollout", words, self.updates_per_rollout)
-        moment = self.second_moment
-        _require(_positive(moment) and moment < 1, "second_moment", "a number between 0 and 1", moment)
-        _require(_positive(self.learning_rate), "learning_rate", "positive and finite", self.learning_rate)
-        share = self.last_learning_rate
-        _require(_positive(share) and share <= 1, "last_learning_rate", "a share above 0, at most 1", share)
-        _require(_positive(self.doubt) and self.doubt < 1, "doubt", "a share above 0, below 1", self.doubt)
-        temperature: Any = self.temperature
-        if isinstance(temperature, list):  # as JSON has it
-            temperature = tuple(temperature)
-            object.__setattr__(self, "temperature", temperature)
+        _require(self.updates % self.updates_per_rollout == 0, "updates per rollout", words, self.updates_per_rollout)
+        pair = isinstance(self.temperature, list | tuple) and len(self.temperature) == 2
+        words = "'auto', or a first and a last one"
+        _require(pair or self.temperature == "auto", "temperature", words, self.temperature)
+        if pair:  # a list, as JSON has it
+            ends = tuple(real("temperature", value, *_TEMPERATURE) for value in self.temperature)
+            object.__setattr__(self, "temperature", ends)
         robust = {str(name): (float(ends[0]), float(ends[1])) for name, ends in self.robust.items()}
         object.__setattr__(self, "robust", robust)
-        pair = isinstance(temperature, tuple) and len(temperature) == 2 and all(map(_positive, temperature))
-        words = "'auto', or a first and a last one, positive and finite"
-        _require(temperature == "auto" or pair, "temperature", words, temperature)
-        _require(self.reward_scale in ("log", "raw"), "reward_scale", "log or raw", self.reward_scale)
-        _require(_whole(self.seed) and self.seed >= 0, "seed", "a whole number, not negative", self.seed)
+        _require(self.reward_scale in ("log", "raw"), "reward scale", "log or raw", self.reward_scale)
         _check_device(self.device)
 
     @property
     def saccades_per_rollout(self) -> int:
         """Saccades performed in one batch."""
         return self.saccades_per_update * self.updates_per_rollout
+
+    @property
+    def warmup_rollouts(self) -> int:
+        """Batches before the first update."""
+        return -(-self.warmup // self.saccades_per_rollout)
+
+    @property
+    def rollouts(self) -> int:
+        """All batches of the run."""
+        return self.warmup_rollouts + self.updates // self.updates_per_rollout
 
     def make_task(self) -> "SaccadeTask":
         """The task again, as it was."""
@@ -294,7 +311,7 @@ class TrainSettings:
         """
         try:
             return cls(**content)
-        except TypeError as error:
+        except (AttributeError, LookupError, TypeError) as error:
             raise InputError(f"these settings are not of this version of orient-eye: {error}") from error
 
 
@@ -307,21 +324,13 @@ def _intervals(task: "SaccadeTask") -> dict[str, tuple[float, float]]:
 
 def _require(fits: bool, name: str, allowed: str, value: Any) -> None:
     if not fits:
-        raise InputError(f"{name.replace('_', ' ')} must be {allowed}, got {value!r}")
-
-
-def _whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _positive(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < math.inf
+        raise InputError(f"{name} must be {allowed}, got {shown(value)}")
 
 
 def _check_device(name: str) -> None:
-    kind, _, number = str(name).partition(":")
-    if kind not in ("cpu", "cuda") or (number and not number.isdecimal()):
-        raise InputError(f"device must be cpu, cuda or cuda:NUMBER, got {name!r}")
+    if not re.fullmatch(r"(cpu|cuda)(:\d{1,3})?", str(name)):
+        raise InputError(f"device must be cpu, cuda or cuda:NUMBER, got {shown(name)}")
+    kind, _, number = name.partition(":")
     if kind == "cuda":
         import torch
 

@@ -12,9 +12,9 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from orient_eye.environments.batch import observe
 from orient_eye.environments.sb3_env import SaccadeVecEnv
-from orient_eye.errors import InputError
-from orient_eye.files import write_table
-from orient_eye.learning.checkpoint import save_checkpoint
+from orient_eye.errors import Ended, InputError
+from orient_eye.files import explained, write_table
+from orient_eye.learning.checkpoint import COLUMNS, Counters, Found, save_checkpoint
 from orient_eye.learning.config import TrainSettings
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.sac import OneStepSAC
@@ -26,10 +26,6 @@ STAGES = (0.0, 0.1, 0.25, 0.5, 1.0)
 _EVALUATIONS = 50  # a run
 CHECKPOINT_S = 20.0
 """Seconds between checkpoints."""
-
-
-class Stop(Exception):
-    """Unwinds SB3's loop between two updates."""
 
 
 class TrainingLoop(BaseCallback):
@@ -49,7 +45,7 @@ class TrainingLoop(BaseCallback):
         super().__init__()
         self.checkpoint_s = checkpoint_s
         self.folder, self.env, self.yardstick, self.table, self.request = folder, env, yardstick, table, request
-        self.updates, self.advance = settings.updates, advance
+        self.settings, self.updates, self.advance = settings, settings.updates, advance
         rollouts = settings.updates // settings.updates_per_rollout
         self.every = max(1, rollouts // _EVALUATIONS) * settings.updates_per_rollout
         self.rows: list[dict[str, float]] = []
@@ -64,12 +60,12 @@ class TrainingLoop(BaseCallback):
         assert isinstance(self.model, OneStepSAC)
         return self.model
 
-    def go_on(self, extra: dict[str, Any]) -> None:
+    def go_on(self, found: Found) -> None:
         """Take up the counters of a checkpoint."""
-        self.rows, self.failed, self.rewards = extra["rows"], extra["failed"], extra["rewards"]
-        self.evaluated = extra["evaluated"]
-        self.began -= extra["elapsed"]
-        self.done_before = extra["updates"]
+        counters = found.counters
+        self.rows, self.failed, self.rewards = counters.rows, counters.failed, counters.rewards
+        self.evaluated, self.done_before = counters.evaluated, found.updates
+        self.began -= counters.elapsed
 
     def _on_rollout_start(self) -> None:
         self._between_updates()
@@ -83,11 +79,7 @@ class TrainingLoop(BaseCallback):
     def _between_updates(self) -> None:
         n = self.algorithm._n_updates
         self.elapsed = time.monotonic() - self.began
-        if not self.algorithm.finite():
-            raise InputError(
-                f"the training diverged at update {n}: the networks hold numbers that are not finite; "
-                "start a new run with a smaller learning rate"
-            )
+        self._require_finite()
         if n % self.every == 0 and n != self.evaluated:
             self._evaluate(n)
         if self.rows:
@@ -95,27 +87,38 @@ class TrainingLoop(BaseCallback):
             row = self.rows[-1]
             note = f"reward {row['reward_mean']:.3g}  gap {100 * row['gap_mean']:.2f} %  {speed:.0f} updates/s"
             if self.failed:
-                note += f"  [red]{self.failed} saccades failed[/red]"
+                note += f"  {self.failed} saccades failed"
             self.advance(n / self.updates, note)
         if self.request.signal is not None:
             self._save()
-            raise Stop
+            raise Ended(self.request.signal)
         if time.monotonic() - self.saved > self.checkpoint_s:
             self._save()
 
     def finish(self) -> None:
-        """The last evaluation and checkpoint."""
+        """The last evaluation and checkpoint.
+
+        Raises:
+            Ended: a stop was asked for meanwhile.
+        """
         self.elapsed = time.monotonic() - self.began
+        self._require_finite()
         if self.evaluated != self.updates:
             self._evaluate(self.updates)
         self._save()
+        if self.request.signal is not None:
+            raise Ended(self.request.signal)
+
+    def _require_finite(self) -> None:
+        if not self.algorithm.finite():
+            raise InputError(
+                f"the training diverged at update {self.algorithm._n_updates}: the networks hold numbers that are not "
+                "finite; start a new run with a smaller learning rate"
+            )
 
     def _save(self) -> None:
-        extra = {
-            "rows": self.rows, "failed": self.failed, "elapsed": self.elapsed, "updates": self.algorithm._n_updates,
-            "evaluated": self.evaluated, "rewards": self.rewards,
-        }  # fmt: skip
-        save_checkpoint(self.folder, self.algorithm, self.env, extra)
+        counters = Counters(self.evaluated, self.failed, self.elapsed, self.rows, self.rewards)
+        save_checkpoint(self.folder, self.settings, self.algorithm, self.env, counters)
         self.saved = time.monotonic()
 
     def _act(self, start: Array, target: Array) -> Array:
@@ -125,20 +128,18 @@ class TrainingLoop(BaseCallback):
     def _evaluate(self, n: int) -> None:
         _, _, gap = self.yardstick.perform(self._act)
         logged = self.algorithm.logger.name_to_value
-        self.rows.append(
-            {
-                "update": n,
-                "saccades": self.num_timesteps,
-                "elapsed_s": round(self.elapsed, 2),
-                "reward_mean": float(np.mean(self.rewards)) if self.rewards else float("nan"),
-                "gap_mean": float(gap.mean()),
-                "gap_p95": float(np.quantile(gap, 0.95)),
-                "temperature": float(logged.get("train/ent_coef", float("nan"))),
-                "q_loss": float(logged.get("train/critic_loss", float("nan"))),
-                "policy_loss": float(logged.get("train/actor_loss", float("nan"))),
-                "failed": self.failed,
-            }
+        nothing = float("nan")
+        row = (
+            n,
+            self.num_timesteps,
+            round(self.elapsed, 2),
+            float(np.mean(self.rewards)) if self.rewards else nothing,
+            float(gap.mean()),
+            float(np.quantile(gap, 0.95)),
+            *(float(logged.get(f"train/{name}", nothing)) for name in ("ent_coef", "critic_loss", "actor_loss")),
+            self.failed,
         )
+        self.rows.append(dict(zip(COLUMNS, row, strict=True)))
         self.rewards = []
         self.evaluated = n
         self._write_metrics()
@@ -160,16 +161,17 @@ class TrainingLoop(BaseCallback):
             from torch.utils.tensorboard import SummaryWriter
         except ImportError:
             return  # an optional extra
-        if not hasattr(self, "writer"):
-            self.writer = SummaryWriter(str(self.folder / "tensorboard"))
-        row = self.rows[-1]
-        for name, value in row.items():
-            self.writer.add_scalar(name, value, int(row["update"]))
-        self.writer.flush()
+        row, folder = self.rows[-1], self.folder / "tensorboard"
+        with explained(folder):
+            if not hasattr(self, "writer"):  # after a resume it tells anew what came after the checkpoint
+                self.writer = SummaryWriter(str(folder), purge_step=int(row["update"]))
+            for name, value in row.items():
+                self.writer.add_scalar(name, value, int(row["update"]))
+            self.writer.flush()
 
 
 class StopRequest:
-    """Ctrl-C, or a signal to end, asks for a stop at the next update; sent again it stops at once.
+    """Ctrl-C, or a signal to end, asks for a stop at the next update; sent again it stops at once, by `Ended`.
 
     Attributes:
         signal: that was received; None as long as there is none.
@@ -182,7 +184,7 @@ class StopRequest:
     def __enter__(self) -> "StopRequest":
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             try:
-                if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup has it
+                if signal.getsignal(number) not in (signal.SIG_IGN, None):  # as nohup has it, or not of Python
                     self.before[number] = signal.signal(number, self._handle)
             except ValueError:  # not in the main thread: Python's own handlers stay
                 break
@@ -196,5 +198,5 @@ class StopRequest:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self.signal is not None:
-            raise KeyboardInterrupt
+            raise Ended(number)
         self.signal = number

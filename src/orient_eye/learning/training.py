@@ -3,15 +3,20 @@
     result = train(TrainConfig(plant="lpf"), Path("runs/first"))
 
 The run directory holds run.json (settings, seed, versions), metrics.csv, optimum.safetensors (the searched optimum),
-stages/ (evaluation saccades at several stages), checkpoint.pt, policy.safetensors, result.json, learning.png,
-policy.png and recording.rrd.
+stages/ (evaluation saccades at several stages), checkpoint.safetensors and the one before it, policy.safetensors,
+result.json, learning.png, policy.png and recording.rrd. One training at a time works in it.
 """
 
 import copy
-import math
+import fcntl
+import os
+import shlex
+import signal
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +24,15 @@ import numpy as np
 import torch
 from stable_baselines3.common.logger import Logger
 
+from orient_eye.checks import real
 from orient_eye.environments.sb3_env import SaccadeVecEnv
-from orient_eye.errors import InputError
-from orient_eye.files import remove_leftovers
+from orient_eye.errors import Ended, InputError
+from orient_eye.files import explained, remove_leftovers, unreadable
 from orient_eye.learning.checkpoint import NAME as CHECKPOINT
-from orient_eye.learning.checkpoint import load_checkpoint
+from orient_eye.learning.checkpoint import PREVIOUS, Found, load_checkpoint
 from orient_eye.learning.config import TrainConfig, TrainSettings
 from orient_eye.learning.evaluation import Yardstick, amplitude_table, carry_optimum, evaluation_saccades, gap_summary
-from orient_eye.learning.loop import CHECKPOINT_S, Stop, StopRequest, TrainingLoop
+from orient_eye.learning.loop import CHECKPOINT_S, StopRequest, TrainingLoop
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.replay_buffer import OneStepReplayBuffer
 from orient_eye.learning.robust import DRAWS, over_the_interval
@@ -45,7 +51,7 @@ _FALLING = 0.6  # of the run, at its end, in which the learning rate falls
 
 
 class Interrupted(Exception):
-    """The run was stopped between two updates; its checkpoint is written.
+    """The run was stopped; it can go on.
 
     Attributes:
         folder: of the run.
@@ -54,7 +60,7 @@ class Interrupted(Exception):
 
     def __init__(self, folder: Path, signal: int) -> None:
         self.folder, self.code = folder, 128 + signal
-        super().__init__(f"stopped; go on with: orient-eye train --resume {folder}")
+        super().__init__(f"stopped; go on with: orient-eye train --resume {shlex.quote(str(folder))}")
 
 
 Begun = Callable[[SaccadeTask], object]
@@ -82,47 +88,78 @@ def train(
         The content of result.json.
 
     Raises:
-        InputError: bad configuration, or the directory is taken.
+        InputError: bad configuration, or the directory is taken, or cannot be written.
         Interrupted: Ctrl-C, or a signal to end.
     """
     _check_interval(checkpoint_s)
     task = config.make_task()  # before the directory: bad input leaves nothing behind
     settings = config.resolved(task)
     _origin(settings, task)
-    run = RunDirectory.create(out, "train", settings, seed=settings.seed)
-    if begun is not None:
-        begun(task)
-    return _Run(settings, task, run, checkpoint_s, quiet).execute(resume=False)
+    out = out or Path("runs") / f"train-{datetime.now():%Y%m%d-%H%M%S}"
+    with explained(out):
+        out.mkdir(parents=True, exist_ok=True)
+    with _alone(out):
+        run = RunDirectory.create(out, "train", settings, seed=settings.seed)
+        if begun is not None:
+            begun(task)
+        return _Run(settings, task, run, checkpoint_s, quiet).execute(resume=False)
 
 
 def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOINT_S) -> dict[str, Any]:
     """Go on with a run that was stopped, to the numbers it would have had.
 
-    From its checkpoint, or from the beginning where it was stopped before the first one.
+    From its newest checkpoint; from the one before it where that is damaged or missing; from the beginning where it was
+    stopped before the first one. run.json keeps under "resumed" from which.
 
     Raises:
-        InputError: no run, or nothing to go on from.
+        InputError: no run, nothing to go on from, or it is trained already, by another process.
         Interrupted: Ctrl-C, or a signal to end.
     """
     _check_interval(checkpoint_s)
-    run = RunDirectory(folder)
-    description = run.read_json("run.json")
-    command = description.get("command") if isinstance(description, dict) else None
-    if command != "train":
-        raise InputError(f"{folder} is a run of {command!r}, not of train")
-    if (folder / "result.json").exists():
-        raise InputError(f"{folder} is finished: its result is in result.json; start a new run instead")
+    with _alone(folder):
+        run = RunDirectory(folder)
+        description = run.read_json("run.json")
+        command = description.get("command") if isinstance(description, dict) else None
+        if command != "train":
+            raise InputError(f"{folder} is a run of {command!r}, not of train")
+        if (folder / "result.json").exists():
+            raise InputError(f"{folder} is finished: its result is in result.json; start a new run instead")
+        try:
+            settings = TrainSettings.from_plain(description["config"])
+            task = settings.make_task()
+            changed = {name: was for name, was in description["versions"].items() if versions().get(name) != was}
+        except (AttributeError, KeyError, InputError) as error:
+            raise InputError(f"cannot go on with run.json in {folder}: {error}") from error
+        if changed:
+            warnings.warn(f"not the numbers it would have had: the run began with {changed}", stacklevel=2)
+        remove_leftovers(folder)
+        begun = any((folder / name).exists() for name in (CHECKPOINT, PREVIOUS))
+        if not begun and (folder / "metrics.csv").exists():
+            warnings.warn(f"{folder} holds no checkpoint: the run begins again", stacklevel=2)
+        return _Run(settings, task, run, checkpoint_s, quiet).execute(resume=begun)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep other trainings out of a folder, until the block ends, or this process however it does.
+
+    Raises:
+        InputError: another one works there, or it is no folder.
+    """
     try:
-        settings = TrainSettings.from_plain(description["config"])
-        task = settings.make_task()
-    except (KeyError, InputError) as error:
-        raise InputError(f"cannot go on with run.json in {folder}: {error}") from error
-    changed = {name: was for name, was in description.get("versions", {}).items() if versions().get(name) != was}
-    if changed:
-        warnings.warn(f"not the numbers it would have had: the run began with {changed}", stacklevel=2)
-    remove_leftovers(folder)
-    begun = (folder / CHECKPOINT).exists()
-    return _Run(settings, task, run, checkpoint_s, quiet).execute(resume=begun)
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except (OSError, ValueError) as error:
+        raise unreadable(folder, error, "this is no run directory, name one") from error
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError(f"another process trains in {folder}; let it end, or name another folder") from error
+        except OSError as error:  # a network's file system locks no folder
+            warnings.warn(f"nothing keeps another training out of {folder}: {error.strerror}", stacklevel=3)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _origin(settings: TrainSettings, task: SaccadeTask) -> Policy | None:
@@ -135,8 +172,7 @@ def _origin(settings: TrainSettings, task: SaccadeTask) -> Policy | None:
 
 
 def _check_interval(checkpoint_s: float) -> None:
-    if not 0 < checkpoint_s < math.inf:
-        raise InputError(f"the time between checkpoints must be positive and finite, got {checkpoint_s} s")
+    real("the time between checkpoints", checkpoint_s, 0.01, 1e6, unit="s")
 
 
 @dataclass(frozen=True)
@@ -150,6 +186,14 @@ class _Run:
     quiet: bool
 
     def execute(self, *, resume: bool) -> dict[str, Any]:
+        """Train, from the beginning or from a checkpoint; returns the result."""
+        try:
+            return self._execute(resume=resume)
+        except KeyboardInterrupt as end:
+            number = end.number if isinstance(end, Ended) else signal.SIGINT
+            raise Interrupted(self.run.path, number) from None
+
+    def _execute(self, *, resume: bool) -> dict[str, Any]:
         settings, folder = self.settings, self.run.path
         # Independent streams from the one seed.
         streams = np.random.SeedSequence(settings.seed).spawn(4)
@@ -163,20 +207,25 @@ class _Run:
         with StopRequest() as request, progress_bar("training", quiet=self.quiet) as advance:
             loop = TrainingLoop(folder, env, settings, yardstick, table, advance, request, self.checkpoint_s)
             if resume:
-                loop.go_on(load_checkpoint(folder, model, env))
-            rollouts = self._warmup_steps() + settings.updates // settings.updates_per_rollout
-            total = rollouts * env.num_envs
-            try:
-                left = total - model.num_timesteps
-                model.learn(left, callback=loop, log_interval=10**9, reset_num_timesteps=not resume)
-            except Stop:
-                assert request.signal is not None
-                raise Interrupted(folder, request.signal) from None
+                found = load_checkpoint(folder, settings, model, env)
+                self._tell(found)
+                loop.go_on(found)
+            left = settings.rollouts * env.num_envs - model.num_timesteps
+            model.learn(left, callback=loop, log_interval=10**9, reset_num_timesteps=not resume)
             loop.finish()
         return self._conclude(model, yardstick, table, loop)
 
-    def _warmup_steps(self) -> int:
-        return -(-self.settings.warmup // self.settings.saccades_per_rollout)
+    def _tell(self, found: Found) -> None:
+        """Say in run.json from where the run goes on, and where that is not the newest checkpoint, warn."""
+        now = datetime.now().astimezone().isoformat(timespec="seconds")
+        told = {"at": now, "from": found.name, "updates": found.updates, "damage": found.damage}
+        description = self.run.read_json("run.json")
+        before = description.get("resumed")
+        resumed = [*(before if isinstance(before, list) else []), told]
+        self.run.write_json("run.json", {**description, "resumed": resumed})
+        if found.damage:
+            words = f"going on from the checkpoint before the newest, at update {found.updates}: {found.damage}"
+            warnings.warn(words, stacklevel=2)
 
     def _env(self) -> SaccadeVecEnv:
         settings, task = self.settings, self.task
@@ -200,7 +249,7 @@ class _Run:
             buffer_size=settings.replay_size,
             replay_buffer_class=OneStepReplayBuffer,
             replay_buffer_kwargs={"seed": buffer_seed},
-            learning_starts=self._warmup_steps() * env.num_envs,
+            learning_starts=settings.warmup_rollouts * env.num_envs,
             train_freq=1,
             gradient_steps=settings.updates_per_rollout,
             policy_waits=round(_WAITS * settings.updates) if settings.origin else 0,
