@@ -2,12 +2,14 @@
 
 import ast
 import inspect
+import io
 import itertools
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import fields, is_dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -24,7 +26,7 @@ from orient_eye.cli.sysid import Sysid
 from orient_eye.cli.tables import say, table
 from orient_eye.cli.train import Train
 from orient_eye.cli.view import View
-from orient_eye.errors import InputError
+from orient_eye.errors import Ended, InputError
 from orient_eye.learning.config import TrainConfig
 from orient_eye.plants import PLANTS, Option, PlantKind
 from orient_eye.registry import load
@@ -36,15 +38,21 @@ SHARED = [
     "orient_eye.cli.another_plant:AnotherPlant",
 ]
 """Options that several commands have."""
-HEAVY = {"torch", "mujoco", "scipy", "rerun", "matplotlib", "trimesh", "stable_baselines3"}
 
 
 def run(
     *arguments: object, cwd: Path | None = None, env: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "orient_eye", *map(str, arguments)]
-    environment = {**os.environ, **(env or {})}
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, check=False)
+    """What a command line says, in this process, or in one of its own that has this environment too."""
+    command = list(map(str, arguments))
+    if env is not None:
+        program = [sys.executable, "-m", "orient_eye", *command]
+        return subprocess.run(program, capture_output=True, text=True, cwd=cwd, env={**os.environ, **env}, check=False)
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err), chdir(cwd or "."), pytest.raises(SystemExit) as end:
+        main(command)
+    assert isinstance(end.value.code, int)
+    return subprocess.CompletedProcess(command, end.value.code, out.getvalue(), err.getvalue())
 
 
 def command_file(folder: Path) -> Path:
@@ -63,16 +71,11 @@ def test_help_lists_every_command() -> None:
         assert f"• {name} " in page.stdout
 
 
-@pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])
-def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
-    program = (
-        "import sys\nfrom orient_eye.cli import main\n"
-        f"try:\n    main({arguments})\nexcept SystemExit as end:\n    assert not end.code\n"
-        f"print(sorted({HEAVY} & set(sys.modules)), file=sys.stderr)"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == "[]"
-    assert f"usage: orient-eye {arguments[0] if len(arguments) > 1 else '['}" in done.stdout
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_a_help_page(name: str) -> None:
+    page = run(name, "--help")
+    assert page.returncode == 0
+    assert f"usage: orient-eye {name} " in page.stdout
 
 
 @pytest.mark.parametrize("place", [*COMMANDS.values(), "orient_eye.learning.config:TrainConfig", *SHARED])
@@ -282,7 +285,7 @@ def test_simulate_holds_the_last_row_up_to_the_horizon(tmp_path: Path) -> None:
     assert (short["samples"], long["samples"]) == (101, 2001)
     assert long["final_yaw_pitch_roll_deg"][0] == pytest.approx(8 * 1.4758, abs=1e-5)
     for horizon in (0.0, -1.0, float("nan"), float("inf"), 1e9):
-        with pytest.raises(InputError, match="--horizon lies between 0 and 3600 s"):
+        with pytest.raises(InputError, match=r"--horizon must be a number from .* to 3600 s"):
             Simulate(command_file(tmp_path), "lpf", horizon=horizon).run()
 
 
@@ -320,6 +323,8 @@ class Result:
         ({"passed": False}, 1, {"passed": False}),
         (InputError("[red]no[/b]"), 2, {"error": "[red]no[/b]"}),
         (KeyboardInterrupt(), 130, None),
+        (Ended(15), 143, None),
+        (MemoryError("8 TiB"), 2, {"error": "not enough memory (8 TiB); ask for less at once"}),
     ],
 )
 def test_exit_codes_and_json(
@@ -331,9 +336,8 @@ def test_exit_codes_and_json(
     assert end.value.code == code
     out, err = capsys.readouterr()
     assert (json.loads(out) if out else None) == printed
-    assert ("interrupted" in err) == (code == 130)
-    if code == 2:
-        assert "error: [red]no[/b]" in err
+    assert ("interrupted" in err) == (code > 128)
+    assert (f"error: {printed['error']}" in err) if code == 2 else "error" not in err
 
 
 # --- errors ---------------------------------------------------------------------------------------
@@ -353,7 +357,7 @@ def test_exit_codes_and_json(
         (["train", "--resume", "nosuch"], "no run directory"),
         (["train", "--resume", "nosuch", "--seed", "3"], "leave the other options out"),
         (["train", "--weights", "0", "0", "0", "0"], "not all 0"),
-        (["train", "--checkpoint-every", "nan"], "positive and finite"),
+        (["train", "--checkpoint-every", "nan"], "the time between checkpoints must be a number"),
         (["predict", "nosuch", "--start", "0", "--target", "5"], "nosuch"),
         (["view", "nosuch.rrd"], "nosuch.rrd"),
         (["view", "."], "is a folder"),
@@ -363,7 +367,7 @@ def test_exit_codes_and_json(
         (["sysid", "--recording"], "--recording names no file"),
         (["sysid", "--until", "3"], "--until is for recordings"),
         (["optimum", "--start", "0", "--target", "500"], "500"),
-        (["validate", "--random-runs", "-1"], "--random-runs"),
+        (["validate", "--random-runs", "-1"], "random runs must be a whole number"),
     ],
 )
 def test_bad_input_is_one_clear_error(arguments: list[str], words: str, tmp_path: Path) -> None:
@@ -423,7 +427,7 @@ def test_recordings_that_cannot_be_read(tmp_path: Path) -> None:
         (tmp_path / "a.rrd" / "c.rrd", {}, "cannot read"),
         (tmp_path / "a.rrd", {"screenshot": Path("a.jpg")}, "NAME.png"),
         (tmp_path / "a.rrd", {"web": True, "screenshot": Path("a.png")}, "exclude each other"),
-        (tmp_path / "a.rrd", {"size": (0, 10)}, "--size"),
+        (tmp_path / "a.rrd", {"screenshot": Path("a.png"), "size": (0, 10)}, "width must be"),
     ):
         with pytest.raises(InputError, match=words):
             View(file, **options).run()

@@ -18,7 +18,7 @@ class Advance(Protocol):
     """Moves a bar."""
 
     def __call__(self, share: float, note: str = "") -> None:
-        """Show the share of the work that is done, 0 to 1, and a note behind the bar (rich's markup)."""
+        """Show the share of the work that is done, 0 to 1, and a note behind the bar."""
         ...
 
 
@@ -31,10 +31,11 @@ def progress_bar(words: str, *, quiet: bool = False) -> Iterator[Advance]:
         quiet: show nothing.
     """
     console = Console(stderr=True)
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %")
-    note = TextColumn("{task.fields[note]}")
+    fields = "{task.description}", "{task.percentage:>3.0f} %", "{task.fields[note]}"
+    told, share, note = (TextColumn(field, markup=False) for field in fields)
+    columns = told, BarColumn(), share, TimeRemainingColumn(), note
     hidden = quiet or not console.is_terminal
-    with Progress(*columns, TimeRemainingColumn(), note, console=console, transient=True, disable=hidden) as bar:
+    with Progress(*columns, console=console, transient=True, disable=hidden) as bar:
         job = bar.add_task(words, total=1.0, note="")
 
         def advance(share: float, note: str = "") -> None:

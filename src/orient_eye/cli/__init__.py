@@ -6,6 +6,7 @@ the result as a dictionary of plain values. No command imports another. What the
     options.py      plants, their options, cases, targets: made from the registries
     saccades.py     --start, --target and --pairs
     tables.py       words and tables for people, on standard error
+    surroundings.py signals, standard streams, folders of libraries
 
 With `--json` the result goes to standard output, and nothing else does. Heavy libraries are imported
 inside `run`, so that `orient-eye --help` answers at once.
@@ -13,12 +14,13 @@ inside `run`, so that `orient-eye --help` answers at once.
 
 import inspect
 import json
-import os
+import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Protocol
 
-from orient_eye.errors import InputError
+from orient_eye.errors import Ended, InputError
 
 COMMANDS = {
     "simulate": "orient_eye.cli.simulate:Simulate",
@@ -51,21 +53,42 @@ class Command(Protocol):
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point of `orient-eye`; exits with 2 on bad input, 130 when interrupted."""
+    """Entry point of `orient-eye`; exits with 2 on bad input, 130 when interrupted, 128 + its number at a signal."""
+    from orient_eye.cli.surroundings import streams
+
     given = list(sys.argv[1:] if arguments is None else arguments)
-    as_json = "--json" in given
-    try:
-        code = _run([a for a in given if a != "--json"], as_json=as_json)
-        sys.stdout.flush()
-    except BrokenPipeError:  # whoever read our output, `head` say, has enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 1
+    with streams():
+        code = _run([a for a in given if a != "--json"], as_json="--json" in given)
     sys.exit(code)
 
 
 def _run(arguments: list[str], *, as_json: bool) -> int:
     """Run a command line; returns the exit code."""
+    from orient_eye.cli.surroundings import signals
     from orient_eye.cli.tables import say
+
+    try:
+        with signals():
+            code = _done(arguments, as_json=as_json)
+            sys.stdout.flush()  # here, where an error is told
+            return code
+    except (InputError, MemoryError) as error:
+        told = f"not enough memory ({error}); ask for less at once" if isinstance(error, MemoryError) else str(error)
+        say(f"error: {told}", style="red")
+        with suppress(InputError, BrokenPipeError):  # which may be what is told
+            if as_json:
+                print(json.dumps({"error": told}))
+        return 2
+    except KeyboardInterrupt as end:
+        say("interrupted")
+        return 128 + (end.number if isinstance(end, Ended) else signal.SIGINT)
+    except BrokenPipeError:
+        return 1
+
+
+def _done(arguments: list[str], *, as_json: bool) -> int:
+    """Do what a command line says, and print the result; returns the exit code."""
+    from orient_eye.cli.surroundings import folders
 
     if "--version" in arguments:
         from orient_eye import __version__
@@ -77,21 +100,15 @@ def _run(arguments: list[str], *, as_json: bool) -> int:
             return _list_commands(arguments)
         from orient_eye.cli.options import parse
 
-        result = parse(_command(arguments[0]), arguments[1:], program=f"orient-eye {arguments[0]}").run()
-    except InputError as error:
-        say(f"error: {error}", style="red")
-        if as_json:
-            print(json.dumps({"error": str(error)}))
-        return 2
-    except KeyboardInterrupt:
-        say("interrupted")
-        return 130
+        command = parse(_command(arguments[0]), arguments[1:], program=f"orient-eye {arguments[0]}")
+        with folders():
+            result = command.run()
+    except SystemExit as end:  # after a help page, or a table of what is wrong with the options
+        return int(end.code or 0)
     if as_json:
-        from orient_eye.run_directory import plain
+        from orient_eye.files import finite
 
-        # JSON has no NaN and no infinity.
-        result = json.loads(json.dumps(result, default=plain), parse_constant=lambda _: None)
-        print(json.dumps(result, indent=2))
+        print(json.dumps(finite(result), indent=2, default=str))
     return 1 if result.get("passed") is False else 0
 
 

@@ -1,6 +1,7 @@
 """Words and tables for people, on standard error. Everything that is printed for people goes through `say`.
 
-Text is printed as it is: nothing in a path or a message is markup. What is to be coloured says so by a style.
+Text is printed as it is: nothing in a path or a message is markup, and what would command a terminal is escaped. What
+is to be coloured says so by a style.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +25,15 @@ def say(message: "str | Table" = "", style: str = "") -> None:
     console = Console(stderr=True, highlight=False, markup=False, emoji=False)
     if not console.is_terminal:
         console.width = _WIDTH
-    console.print(message, style=style or None, soft_wrap=isinstance(message, str))
+    if isinstance(message, str):
+        console.print(_tame(message), style=style or None, soft_wrap=True)
+    else:
+        console.print(message)
+
+
+def _tame(text: str) -> str:
+    """Text with what no terminal should be sent escaped: control characters other than the end of a line."""
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
 def table(
@@ -40,11 +49,12 @@ def table(
     """
     from rich.table import Table
 
-    made = Table(title=title, title_justify="left", title_style="bold")
+    made = Table(title=_tame(title), title_justify="left", title_style="bold")
     for heading in columns:
         made.add_column(heading, justify="left" if heading in left else "right")
     for row in rows:
-        made.add_row(*(cell(row) for cell in columns.values()))
+        cells = (cell(row) for cell in columns.values())
+        made.add_row(*(_tame(words) if isinstance(words, str) else words for words in cells))
     return made
 
 

@@ -48,29 +48,36 @@ class View:
             say(f"in {self.screenshot}")
             result |= {"screenshot": str(self.screenshot), "not_shown": missing}
         elif self.web:
-            say("Open this address in a browser on this machine; Ctrl+C ends it.")
-            result["address"] = viewer.serve(self.file, say)
+
+            def announce(address: str) -> None:
+                say("Open this address in a browser on this machine; Ctrl+C ends it.")
+                say(address)
+
+            result["address"] = viewer.serve(self.file, announce)
         else:
             viewer.open_window(self.file)
         return result
 
     def _check(self) -> None:
         from orient_eye.cli.places import check_outputs
+        from orient_eye.files import unreadable
+        from orient_eye.resources import printable
 
         if self.file.is_dir():
-            raise InputError(f"{self.file} is a folder; name the recording in it, NAME.rrd")
+            raise InputError(f"{printable(self.file)} is a folder; name the recording in it, NAME.rrd")
         try:
+            if self.file.exists() and not self.file.is_file():  # a pipe would keep us waiting
+                raise OSError("it is no file")
             with self.file.open("rb") as file:
                 recording = file.read(3) == b"RRF"
         except (OSError, ValueError) as error:
-            words = getattr(error, "strerror", None) or error
-            raise InputError(f"cannot read {self.file}: {words}; orient-eye simulate writes recordings") from error
+            raise unreadable(self.file, error, "orient-eye simulate writes recordings") from error
         if not recording:
-            raise InputError(f"{self.file} is not a recording: give a file NAME.rrd, as orient-eye simulate writes")
+            raise InputError(
+                f"{printable(self.file)} is not a recording: give a file NAME.rrd, as orient-eye simulate writes"
+            )
         if self.screenshot is not None and self.screenshot.suffix != ".png":
             raise InputError(f"a picture is a file NAME.png, got {self.screenshot.name!r}")
         if self.web and self.screenshot is not None:
             raise InputError("--web and --screenshot exclude each other: give one")
-        if min(self.size) < 1:
-            raise InputError(f"--size is the width and height in pixels, got {self.size[0]} {self.size[1]}")
         check_outputs({"--screenshot": self.screenshot}, {"the recording": self.file})

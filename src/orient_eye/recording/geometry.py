@@ -72,5 +72,6 @@ def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[Array, NDArray[np.int64], A
     vertices = model.mesh_vert[first : first + count]
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     solid = trimesh.Trimesh(vertices, model.mesh_face[first : first + count], process=False)
-    shaded = trimesh.graph.smooth_shade(solid, angle=_CREASE)
+    # Without facets, which change next to nothing: what looks for them swallows every exception, Ctrl-C's too.
+    shaded = trimesh.graph.smooth_shade(solid, angle=_CREASE, facet_minarea=None)
     return np.array(shaded.vertices), np.array(shaded.faces), np.array(shaded.vertex_normals)

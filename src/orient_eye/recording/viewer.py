@@ -5,12 +5,10 @@ Every viewer listens on this machine only (127.0.0.1), sends no usage statistics
 
 import importlib.resources
 import os
-import signal
 import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -18,23 +16,32 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from orient_eye.errors import InputError
+from platformdirs import user_cache_path
+
+from orient_eye.checks import real, whole
+from orient_eye.errors import Ended, InputError
 from orient_eye.files import write_atomically
+from orient_eye.recording import guard, web_page
 from orient_eye.recording.scene import TIMELINE
+from orient_eye.recording.web_page import LOCAL
+from orient_eye.resources import printable
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
-_LOCAL = "127.0.0.1"
-_START_S, _SETTLE_S, _END_S = 30.0, 15.0, 5.0
+LARGEST = 4096
+"""Pixels of a picture's width or height, which takes a machine without a graphics card seconds."""
+_FAILURES = (OSError, RuntimeError)  # of the viewer's client
+_START_S, _SETTLE_S = 30.0, 15.0
 
 
 def open_window(file: Path) -> None:
     """Show a recording in a window, and return when it is closed.
 
     Raises:
-        InputError: there is no screen, or the viewer fails.
+        InputError: the recording is damaged, there is no screen, or the viewer fails.
     """
+    _verify(file)
     with started(file) as process:
         _wait(process)
 
@@ -51,7 +58,7 @@ def started(file: Path) -> "Iterator[subprocess.Popen[bytes]]":
             "this machine has no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): see the recording in a browser "
             "(orient-eye view FILE --web), or as a picture (--screenshot PICTURE.png)"
         )
-    with _viewer("--bind", _LOCAL, "--port", "auto", str(file), quiet=False) as process:
+    with _viewer("--bind", LOCAL, "--port", "auto", str(file), quiet=False) as process:
         yield process
 
 
@@ -62,15 +69,21 @@ def serve(file: Path, announce: Callable[[str], object]) -> str:
         The address.
 
     Raises:
-        InputError: the server fails.
+        InputError: the recording is damaged, or the server fails.
     """
+    _verify(file)
     page, data = _free_port(), _free_port()
-    address = f"http://{_LOCAL}:{page}?url={quote(f'rerun+http://{_LOCAL}:{data}/proxy', safe='')}"
-    options = ["--serve-web", "--bind", _LOCAL, "--port", str(data), "--web-viewer-port", str(page)]
-    with _viewer(*options, str(file)) as server:
-        announce(address)
-        with suppress(KeyboardInterrupt):
-            _wait(server)
+    options = ["--serve-web", "--bind", LOCAL, "--port", str(data), "--web-viewer-port", str(page)]
+    with _viewer(*options, str(file)) as process, web_page.served(page, data) as port:
+        address = f"http://{LOCAL}:{port}?url={quote(f'rerun+http://{LOCAL}:{data}/proxy', safe='')}"
+        _await(process, page)
+        try:
+            announce(address)
+            _wait(process)
+        except Ended:
+            raise
+        except KeyboardInterrupt:
+            pass
     return address
 
 
@@ -95,14 +108,17 @@ def screenshot(
         What the viewer could not show; nothing, if all is well.
 
     Raises:
-        InputError: no such tab, the viewer does not start, or the picture cannot be written.
+        InputError: no such instant, size or tab, a damaged recording or none of ours, the viewer does not start, or
+            the picture cannot be written.
     """
+    for side, pixels in zip(("width", "height"), size, strict=True):
+        whole(f"the picture's {side}", pixels, 1, LARGEST)
     with _headless(file, size) as viewer:
         if tab:
             _activate(viewer, tab)
         state = viewer.get_state()
-        timeline = next(t for t in state.recordings[0].timelines if t.name == TIMELINE)
-        at = (timeline.end or 0) / 1e9 if at_s is None else at_s  # ns
+        end = max((t.end or 0) / 1e9 for t in state.recordings[0].timelines if t.name == TIMELINE)  # ns
+        at = end if at_s is None else real("the instant of the picture", at_s, 0, end, unit="s")
         viewer.set_time(TIMELINE, duration=at, play_state="paused")
         image, earlier, deadline = b"", b"-", time.monotonic() + _SETTLE_S
         while image != earlier and time.monotonic() < deadline:
@@ -114,42 +130,35 @@ def screenshot(
 
 @contextmanager
 def _viewer(*arguments: str, quiet: bool = True, log: IO[bytes] | None = None) -> "Iterator[subprocess.Popen[bytes]]":
-    """The viewer as a process that has ended when the block has, also where SIGTERM or SIGHUP ends us."""
+    """The viewer as a process that has ended when the block has; where we are killed, `guard` ends it."""
+    command = [sys.executable, "-I", guard.__file__, _executable(), *arguments]
+    # In a session of its own no signal of the terminal reaches it before us.
+    options: Any = {"env": _environment(quiet), "stdin": subprocess.PIPE, "start_new_session": True}
+    process = subprocess.Popen(command, stdout=log, stderr=log, **options)
+    try:
+        yield process
+    finally:
+        process.communicate()  # closes its standard input, which ends it
+
+
+def _environment(quiet: bool) -> dict[str, str]:
+    """Of a viewer that sends no usage statistics, and keeps what it keeps in our cache folder."""
     environment = {name: value for name, value in os.environ.items() if name != "FORCE_RERUN_ANALYTICS"}
     environment["CI"] = "1"  # the one variable that turns its usage statistics off, and it keeps no file of them
+    with suppress(RuntimeError):  # nobody's home
+        environment |= dict.fromkeys(["XDG_CACHE_HOME", "XDG_DATA_HOME"], str(user_cache_path("orient-eye") / "viewer"))
     if quiet:
         environment["RUST_LOG"] = "error"  # messages would stand in the picture
-    with _signals_raise():
-        process = subprocess.Popen([_executable(), *arguments], env=environment, stdout=log, stderr=log)
-        try:
-            yield process
-        finally:
-            process.terminate()
-            try:
-                process.wait(_END_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+    return environment
 
 
-@contextmanager
-def _signals_raise() -> Iterator[None]:
-    """SIGTERM and SIGHUP raise SystemExit in this block, so that what stands in `finally` is done."""
-
-    def end(number: int, _: object) -> None:
-        sys.exit(128 + number)
-
-    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    if threading.current_thread() is not threading.main_thread():  # only there may handlers be set
-        numbers = []
-    numbers = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]  # nohup ignores SIGHUP
-    for number in numbers:
-        signal.signal(number, end)
-    try:
-        yield
-    finally:
-        for number in numbers:
-            signal.signal(number, signal.SIG_DFL)
+def _verify(file: Path) -> None:
+    """Rerun's own check of a recording; the viewer would show nothing of a damaged one, or wait."""
+    command = [_executable(), "rrd", "verify", str(file)]
+    done = subprocess.run(command, env=_environment(quiet=True), capture_output=True, text=True, check=False)
+    told = (done.stdout + done.stderr).strip().splitlines()
+    if done.returncode or told[-1:] != ["1 file verified without error."]:
+        raise InputError(f"{printable(file)} is damaged, or no recording: {' '.join(told)[:300]}; write it anew")
 
 
 def _wait(process: "subprocess.Popen[bytes]") -> None:
@@ -157,6 +166,16 @@ def _wait(process: "subprocess.Popen[bytes]") -> None:
     code = process.wait()
     if code:
         raise InputError(f"the Rerun viewer failed (exit code {code}); what it said stands above")
+
+
+def _await(process: "subprocess.Popen[bytes]", port: int) -> None:
+    """Until the viewer listens, or ends."""
+    deadline = time.monotonic() + _START_S
+    while process.poll() is None and time.monotonic() < deadline:
+        with socket.socket() as probe:
+            if not probe.connect_ex((LOCAL, port)):
+                return
+        time.sleep(0.05)
 
 
 def _executable() -> str:
@@ -167,7 +186,7 @@ def _executable() -> str:
 
 
 def _free_port() -> int:
-    with socket.create_server((_LOCAL, 0)) as probe:
+    with socket.create_server((LOCAL, 0)) as probe:
         port: int = probe.getsockname()[1]
         return port
 
@@ -176,8 +195,9 @@ def _free_port() -> int:
 def _headless(file: Path, size: tuple[int, int]) -> Iterator["ViewerClient"]:
     from rerun.experimental import ViewerClient
 
+    _verify(file)
     port = _free_port()
-    options = ["--headless", "--bind", _LOCAL, "--port", str(port), "--window-size", f"{size[0]}x{size[1]}"]
+    options = ["--headless", "--bind", LOCAL, "--port", str(port), "--window-size", f"{size[0]}x{size[1]}"]
     with tempfile.TemporaryFile() as log, _viewer(*options, str(file), log=log) as process:
         viewer = _connect(ViewerClient, process, port)
         if viewer is None:
@@ -187,22 +207,30 @@ def _headless(file: Path, size: tuple[int, int]) -> Iterator["ViewerClient"]:
                 "mesa-vulkan-drivers libvulkan1 libgl1-mesa-dri libxkbcommon-x11-0 libxcursor1 libxi6 "
                 f"libxrandr2. It said: {log.read().decode(errors='replace').strip()[-500:]}"
             )
-        yield viewer
-        viewer.run_command("ui.quit")
-        process.wait(_SETTLE_S)
+        try:
+            yield viewer
+        except _FAILURES as error:
+            raise InputError(f"the Rerun viewer failed: {error}") from error
 
 
 def _connect(client: Any, process: "subprocess.Popen[bytes]", port: int) -> "ViewerClient | None":
-    """The client of a viewer that has loaded its recording, or None."""
+    """The client of a viewer that has loaded its recording, or None.
+
+    Raises:
+        InputError: the recording is not ours.
+    """
     deadline = time.monotonic() + _START_S
     while process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.2)
         try:
-            viewer: ViewerClient = client.connect(f"rerun+http://{_LOCAL}:{port}/proxy")
+            viewer: ViewerClient = client.connect(f"rerun+http://{LOCAL}:{port}/proxy")
             state = viewer.get_state()
-        except (ConnectionError, OSError, RuntimeError, ValueError):
+        except (*_FAILURES, ValueError):
             continue
-        if state.recordings and state.recordings[0].timelines and not state.loading:
+        recording = next(iter(state.recordings), None)
+        if recording and recording.timelines and not state.loading:
+            if TIMELINE not in [timeline.name for timeline in recording.timelines]:
+                raise InputError(f"orient-eye did not write this recording: it lacks the timeline {TIMELINE}")
             return viewer
     return None
 
