@@ -460,6 +460,60 @@ def test_the_environment_of_a_surrogate(tmp_path: Any) -> None:
 # --- what one asks of all three -------------------------------------------------------------------
 
 
+THREE = pytest.mark.parametrize(
+    ("make", "shape"),
+    [
+        (SaccadeEnv, (3,)),
+        (lambda **options: SaccadeVectorEnv(1, **options), (1, 3)),
+        (lambda **options: SaccadeVecEnv(1, **options), (1, 3)),
+    ],
+    ids=["single", "vector", "sb3"],
+)
+
+
+@THREE
+def test_weights_of_ones_own_and_what_a_step_tells(make: Any, shape: tuple[int, ...]) -> None:
+    """Weights in a row or by name hold from the first step on; all three tell of a saccade the same."""
+    weights = {"accuracy": 1e7, "energy": 1.0, "duration": 1e4, "overshoot": 1e5}
+    for told in (tuple(weights.values()), weights):
+        env = make(weights=told, case="2-varying")
+        env.reset()
+        infos = env.step(np.zeros(shape, np.float32))[-1]
+        info = infos[0] if isinstance(infos, list) else infos.get("final_info", infos)
+        assert {"duration_ms", "peak_velocity_deg_s", "overshoot", "skewness", "settled", "failed"} <= set(info)
+        parts = sum(float(np.squeeze(info[f"reward_{name}"])) for name in weights)
+        assert float(np.squeeze(info["reward"])) == pytest.approx(parts)
+        assert env.task.weights == weights
+        env.close()
+        env.close()
+
+
+@THREE
+def test_actions_that_are_no_actions_are_refused(make: Any, shape: tuple[int, ...]) -> None:
+    """And the saccade is still there to be made."""
+    env = make()
+    env.reset()
+    for action in (np.zeros((*shape, 1)), np.zeros(shape[:-1]), "go", None, [[1.0], [1.0, 2.0]], np.full(shape, 1j)):
+        with pytest.raises(InputError, match="action"):
+            env.step(action)
+    for action in (np.full(shape, np.inf), np.zeros(shape, int), np.zeros(shape).tolist()):
+        env.step(action)
+        env.reset()
+
+
+@pytest.mark.parametrize("kind", [SaccadeVectorEnv, SaccadeVecEnv])
+@pytest.mark.parametrize("count", [0, -1, 1.5, "lpf", None, True, 10**9])
+def test_how_many_saccades_is_a_whole_number(kind: Any, count: Any) -> None:
+    with pytest.raises(InputError, match=r"must be a whole number from 1 to 1000000, got"):
+        kind(count, 4 if count == "lpf" else "lpf")
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5, "a"])
+def test_a_seed_of_the_sb3_batch_is_one(seed: Any) -> None:
+    with pytest.raises(InputError, match="seed must be a whole number of at least 0"):
+        SaccadeVecEnv(2, seed=seed)
+
+
 def test_options_of_the_sb3_batch() -> None:
     """`set_options` takes effect at the next reset, and once; the same for all, or one for each."""
     env = SaccadeVecEnv(3, seed=0)

@@ -250,8 +250,6 @@ def test_start_of_the_wrong_shape_is_refused(plant: Plant) -> None:
                 plant.move(what, start)
     with pytest.raises(InputError, match=r"angular velocities \(2, 3\).*got \(2, 4\), \(2, 2\)"):
         State(np.tile(FORWARD, (2, 1)), np.zeros((2, motors)), np.zeros((2, 2)))
-    with pytest.raises(InputError, match=r"zero quaternion.*\(1, 0, 0, 0\)"):
-        State(np.zeros((2, 4)), np.zeros((2, motors)))
 
 
 @pytest.mark.parametrize("length", [2.0, 1e160, 1e-160, -1e300])
@@ -320,17 +318,12 @@ def test_order_and_company_do_not_matter(plant: Plant) -> None:
     identical(run(plant, command, start), found, list(shuffled))
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 @pytest.mark.parametrize("row", [0, 70])
 def test_a_command_that_is_none_fails_alone(plant: Plant, bad: float, row: int) -> None:
-    command, last = saccades(plant), plant.motors[-1]
+    command = saccades(plant)
     command[2, row, -1] = bad
-    if bad == np.inf and np.isfinite(last.range).all():
-        with pytest.raises(InputError, match=rf"saccade 2 sends {last.name} to inf {last.unit} .* mechanical range is"):
-            plant.move(command)
-        return
-    with np.errstate(invalid="ignore"):
-        found = run(plant, command)
+    found = run(plant, command)
     assert found.failed.tolist() == [False, False, True, False, False]
     for name in ("orientation", "angular_velocity", "motor", "tension"):
         if getattr(found, name) is not None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from orient_eye import rotations
 from orient_eye.errors import InputError
 from orient_eye.motor import Motor, check_driven, names, ranges
-from orient_eye.state import State, unit
+from orient_eye.state import State, as_numbers, unit
 
 Array = NDArray[np.float64]
 
@@ -94,12 +94,31 @@ def test_one_eye_does_not_touch_another() -> None:
 
 
 @pytest.mark.parametrize("zero", [0.0, -0.0])
-def test_the_zero_quaternion_is_refused(zero: float) -> None:
+def test_the_zero_quaternion_is_none(zero: float) -> None:
+    """A target is refused; of a start only its own eye is none."""
     orientation = np.array([[1.0, 0, 0, 0], [zero] * 4])
     with pytest.raises(InputError, match=r"zero quaternion; looking straight ahead is \(1, 0, 0, 0\)"):
         unit(orientation)
-    with pytest.raises(InputError, match="zero quaternion"):
-        State(orientation, np.zeros((2, 1)))
+    state = State(orientation, np.zeros((2, 1)))
+    np.testing.assert_array_equal(state.orientation[0], [1.0, 0, 0, 0])
+    assert state.finite.tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    "values", [[[1.0], [1.0, 2.0]], None, "abc", [["1", "0"]], [[1j, 0]], np.zeros((1, 2), object), [[True, False]]]
+)
+def test_real_numbers_and_nothing_else(values: object) -> None:
+    with pytest.raises(InputError, match="what it is must be an array of real numbers, "):
+        as_numbers("what it is", values)
+    with pytest.raises(InputError, match="motor positions must be an array of real numbers"):
+        State([[1, 0, 0, 0]], values)  # type: ignore[arg-type]
+
+
+def test_numbers_of_any_kind_are_floats() -> None:
+    for values in ([[1, 2]], np.array([[1, 2]], np.int8), np.array([[1, 2]], ">f4"), np.array([[1, 2]], np.longdouble)):
+        found = as_numbers("what it is", values)
+        assert found.dtype == float
+        np.testing.assert_array_equal(found, [[1.0, 2.0]])
 
 
 # --- states ---------------------------------------------------------------------------------------

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from orient_eye.errors import InputError
 
 Array = NDArray[np.float64]
+LARGEST = 1e9
+"""deg, deg/s, 1/s: a larger number is as good as none, and only makes others overflow."""
 
 
 @dataclass(frozen=True)
@@ -16,12 +18,12 @@ class State:
     """The state of a batch of eyes at one instant.
 
     Attributes:
-        orientation: unit quaternions w, x, y, z, (saccades, 4); normalised here.
+        orientation: unit quaternions w, x, y, z, (saccades, 4); normalised here. The zero quaternion is none, and NaN.
         motor: positions of all motors of the plant, which rest there, in their units, (saccades, motors).
         angular_velocity: head frame [deg/s], (saccades, 3); unless given, at rest.
 
     Raises:
-        InputError: shapes that do not fit, or a zero quaternion.
+        InputError: shapes that do not fit, or what are no real numbers.
     """
 
     orientation: Array
@@ -29,17 +31,18 @@ class State:
     angular_velocity: Array = None  # type: ignore[assignment]  # never None once made
 
     def __post_init__(self) -> None:
-        orientation, motor = (np.asarray(a, dtype=float) for a in (self.orientation, self.motor))
-        velocity = np.zeros((len(orientation), 3)) if self.angular_velocity is None else self.angular_velocity
-        velocity = np.asarray(velocity, dtype=float)
-        count = len(orientation)
+        orientation, motor = as_numbers("orientations", self.orientation), as_numbers("motor positions", self.motor)
+        count = len(orientation) if orientation.ndim else 0
+        velocity = np.zeros((count, 3)) if self.angular_velocity is None else self.angular_velocity
+        velocity = as_numbers("angular velocities", velocity)
         shapes = (orientation.shape, velocity.shape, motor.shape[:1])
         if shapes != ((count, 4), (count, 3), (count,)) or motor.ndim != 2:
             raise InputError(
                 f"a state of {count} eyes has orientations ({count}, 4), angular velocities ({count}, 3) and motor "
                 f"positions ({count}, motors), got {orientation.shape}, {velocity.shape} and {motor.shape}"
             )
-        object.__setattr__(self, "orientation", unit(orientation))
+        none = ~orientation.any(axis=1, keepdims=True)
+        object.__setattr__(self, "orientation", unit(np.where(none, np.nan, orientation)))
         object.__setattr__(self, "motor", motor)
         object.__setattr__(self, "angular_velocity", velocity)
 
@@ -65,6 +68,31 @@ class State:
         """Whether all numbers of each eye are finite, (saccades,)."""
         parts = (self.orientation, self.motor, self.angular_velocity)
         return np.asarray(np.isfinite(np.concatenate(parts, axis=1)).all(axis=1))
+
+
+def as_numbers(what: str, values: Any) -> Array:
+    """Real numbers as an array of floats.
+
+    Args:
+        what: they are, for messages.
+        values: an array or nested lists.
+
+    Raises:
+        InputError: rows of different lengths, or something else: text, truth values, complex numbers, objects.
+    """
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise InputError(f"{what} must be an array of real numbers, and this is none: {error}") from error
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{what} must be an array of real numbers, got one of {array.dtype}")
+    return array.astype(float, copy=False)
+
+
+def sane(numbers: Array, least: float = 0.0) -> Array:
+    """Numbers, and NaN where they are none, or their size is below the least or beyond `LARGEST`."""
+    size = np.abs(numbers)
+    return np.where((size >= least) & (size <= LARGEST), numbers, np.nan)
 
 
 def unit(orientation: Array) -> Array:

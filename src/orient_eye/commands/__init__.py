@@ -12,6 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
+from orient_eye.checks import real
+from orient_eye.constants import LONGEST_S
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:  # the names of pulses are listed without NumPy
@@ -68,12 +70,12 @@ class Sampled:
     """Positions at even intervals, straight lines between them, the last one held.
 
     Attributes:
-        positions: (saccades, time, motors).
-        step_s: interval [s].
+        positions: (saccades, time, motors); NaN where they are not finite, or beyond 1e9.
+        step_s: interval [s], from 1 us to an hour.
         saturates: see `Command`.
 
     Raises:
-        InputError: another shape.
+        InputError: another shape, what are no real numbers, or another interval.
     """
 
     positions: Array
@@ -81,15 +83,13 @@ class Sampled:
     saturates: bool = False
 
     def __post_init__(self) -> None:
-        import numpy as np
+        from orient_eye.state import as_numbers, sane
 
-        try:
-            positions = np.asarray(self.positions, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"a command is an array of numbers (saccades, time, motors): {error}") from error
+        positions = as_numbers("the positions (saccades, time, motors) of a command", self.positions)
+        checked_step(self.step_s)
         if positions.ndim != 3 or not positions.shape[1]:
             raise InputError(f"a command has the shape (saccades, time, motors), got {positions.shape}")
-        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "positions", sane(positions))
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -128,6 +128,15 @@ class Sampled:
         import numpy as np
 
         return np.zeros(len(self), bool)
+
+
+def checked_step(step_s: float) -> float:
+    """An interval between samples [s].
+
+    Raises:
+        InputError: it is none, shorter than 1 us, or longer than any movement.
+    """
+    return real("the interval step_s between samples", step_s, 1e-6, LONGEST_S, unit="s")
 
 
 def path_energy(positions: Array, step_s: float) -> Array:

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from orient_eye.commands.exponentials import ExponentialSum, filter_energy
 from orient_eye.commands.pulses import PULSES, Pulse
 from orient_eye.errors import InputError
+from orient_eye.state import LARGEST, as_numbers, sane
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class PulseStep:
     """A batch of pulse-step commands.
+
+    A number that is not finite, or beyond 1e9, or a rate below 1e-9, is taken for NaN: its saccade fails.
 
     Attributes:
         F: initial motor positions [deg], (saccades, motors).
@@ -40,7 +43,7 @@ class PulseStep:
         too_fast: whether C was to hold the command to a speed limit and cannot, (saccades,); none unless given.
 
     Raises:
-        InputError: unknown pulse, missing C, or B, k0, C not positive.
+        InputError: unknown pulse, missing C, B, k0 or C not positive, or what are no real numbers of one shape.
     """
 
     F: Array
@@ -57,16 +60,20 @@ class PulseStep:
         onset = self.kind.onset
         if onset and self.C is None:
             raise InputError(f"pulse {self.pulse!r} needs C; the thesis uses {onset.fixed}, or varying_C()")
-        arrays = np.broadcast_arrays(
-            *(np.asarray(a, float) for a in (self.F, self.B, self.D, self.k0, 0.0 if self.C is None else self.C))
-        )
-        for name, array in zip(("F", "B", "D", "k0", "C"), arrays, strict=True):
-            object.__setattr__(self, name, array)
+        told = {"F": self.F, "B": self.B, "D": self.D, "k0": self.k0, "C": 0.0 if self.C is None else self.C}
+        values = [as_numbers(name, value) for name, value in told.items()]
+        try:
+            arrays = np.broadcast_arrays(*values)
+        except ValueError as error:
+            shapes = ", ".join(str(value.shape) for value in values)
+            raise InputError(f"{', '.join(told)} have the shape (saccades, motors), got {shapes}") from error
+        for name, array in zip(told, arrays, strict=True):
             if array.ndim != 2:
                 raise InputError(f"{name} has the shape (saccades, motors), got {array.shape}")
             positive = name in ("B", "k0") or (name == "C" and onset is not None)
             if positive and (array <= 0).any():
                 raise InputError(f"{name} must be positive, got {array.min():g}")
+            object.__setattr__(self, name, sane(array, 1 / LARGEST if positive else 0.0))
         given: Any = self.too_fast
         object.__setattr__(self, "too_fast", np.zeros(len(self.F), bool) if given is None else given)
 

@@ -31,7 +31,10 @@ def _variant3(B: Array, k0: Array, C: Array) -> ExponentialSum:
 
 
 def _root2(size: Array, B: Array, k0: Array, V: float) -> Array:
-    """A C = V (4.18), so C = V k0 / (|D - F| B) - B; at most 1e5, for saccades of no size."""
+    """A C = V (4.18), so C = V k0 / (|D - F| B) - B; at most 1e5, for saccades of no size.
+
+    That is the speed at the onset, the largest where k0 <= 2 B + C, as in all of the thesis' ranges.
+    """
     return np.asarray(np.minimum(V * k0 / (size * B) - B, 1e5))
 
 

@@ -6,17 +6,19 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from orient_eye.errors import InputError
 from orient_eye.motor import names
 from orient_eye.plants import Plant, make_plant
-from orient_eye.state import State, unit
+from orient_eye.state import State, as_numbers, unit
 from orient_eye.task.saccade import Outcome, SaccadeTask
 from orient_eye.task.table import outcome_columns
 
 Array = NDArray[np.float64]
 _REFERENCE_REWARD = 1e5  # where the log reward is 0: the cost of a large saccade done well
+MOST_SACCADES = 1_000_000
+"""In one batch: more fill the memory of most computers."""
 RENDER_MODES = ("human", "rgb_array", "rgb_array_list")
 
 
@@ -135,25 +137,25 @@ class SaccadeBatch:
         return targets.rest(orientations[0]), unit(orientations[1])
 
     def perform(
-        self, scaled: NDArray[Any], random: np.random.Generator | None = None
+        self, scaled: ArrayLike, random: np.random.Generator | None = None
     ) -> tuple[Array, NDArray[np.float32]]:
         """Perform the saccades.
 
         Args:
-            scaled: actions in -1 .. 1, (saccades, numbers).
+            scaled: actions in -1 .. 1, (saccades, numbers); of one that is NaN the saccade fails.
             random: of a plant that is noisy.
 
         Returns:
             Rewards (saccades,), and observations of where the eyes came to rest (saccades, 8).
 
         Raises:
-            InputError: none is in progress, or actions of another shape.
+            InputError: none is in progress, or actions of another shape, or what are no real numbers.
         """
         if self.start is None:
             raise InputError("reset the environment before a saccade: an episode is one step")
-        shape = (len(self.start), len(self.task.actions.numbers))
-        if np.shape(scaled) != shape:
-            raise InputError(f"actions have the shape {shape}, got {np.shape(scaled)}")
+        shape, scaled = (len(self.start), len(self.task.actions.numbers)), as_numbers("actions", scaled)
+        if scaled.shape != shape:
+            raise InputError(f"actions have the shape {shape}, got {scaled.shape}")
         start, self.start = self.start, None
         self.began = start
         self.action = self.task.actions.from_unit(scaled)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from orient_eye.environments.batch import RENDER_MODES, SaccadeBatch, check_render_mode, make_task
 from orient_eye.plants import Plant
+from orient_eye.state import as_numbers
 from orient_eye.task.saccade import SaccadeTask
 from orient_eye.task.table import rows_of
 
@@ -113,7 +114,7 @@ class SaccadeEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Perform the saccade; the episode ends. The observation then shows where the eye came to rest."""
-        reward, observation = self.batch.perform(np.asarray(action, dtype=float)[None], self.np_random)
+        reward, observation = self.batch.perform(as_numbers("an action", action)[None], self.np_random)
         info = rows_of(self.batch.described(), missing=np.nan)[0]
         if self.render_mode == "human":
             self.render()

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from orient_eye.environments.batch import SaccadeBatch, check_render_mode, make_task
+from orient_eye.checks import whole
+from orient_eye.environments.batch import MOST_SACCADES, SaccadeBatch, check_render_mode, make_task
 from orient_eye.errors import InputError
 from orient_eye.plants import Plant
 from orient_eye.state import State
@@ -32,7 +33,7 @@ class SaccadeVecEnv(VecEnv):
         plant: a name of `orient_eye.plants.PLANTS`, a plant, or a whole task.
         plant_options: keywords of that plant.
         log_reward: give the log reward.
-        seed: of starts and targets.
+        seed: of starts and targets, 0 or more.
         render_mode: "rgb_array" or None.
         infos: give `info` of every saccade, the row of `orient_eye.task.table`; without, only what SB3 needs, which
             is quicker.
@@ -51,8 +52,9 @@ class SaccadeVecEnv(VecEnv):
         infos: bool = True,
         **task_options: Any,
     ) -> None:
-        if saccades < 1:
-            raise InputError(f"a batch has at least one saccade, got {saccades}")
+        saccades = whole("saccades", saccades, 1, MOST_SACCADES, advice="so many are one batch; the plant comes second")
+        if seed is not None:
+            seed = whole("seed", seed, 0)
         if render_mode not in (None, "rgb_array"):
             raise InputError(f"SB3 renders 'rgb_array' or nothing, got {render_mode!r}")
         self.render_mode = check_render_mode(render_mode)

@@ -12,7 +12,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from orient_eye.environments.batch import RENDER_MODES, SaccadeBatch, check_render_mode, make_task
+from orient_eye.checks import whole
+from orient_eye.environments.batch import MOST_SACCADES, RENDER_MODES, SaccadeBatch, check_render_mode, make_task
 from orient_eye.errors import InputError
 from orient_eye.plants import Plant
 from orient_eye.task.saccade import SaccadeTask
@@ -51,12 +52,10 @@ class SaccadeVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         render_mode: str | None = None,
         **task_options: Any,
     ) -> None:
-        if num_envs < 1:
-            raise InputError(f"a batch has at least one saccade, got num_envs = {num_envs}")
         if render_mode == "human":
             raise InputError("render_mode 'human' shows one saccade; use gymnasium.make, or 'rgb_array_list'")
         self.render_mode = check_render_mode(render_mode)
-        self.num_envs = num_envs
+        self.num_envs = whole("num_envs", num_envs, 1, MOST_SACCADES, advice="so many saccades are one batch")
         self.task = make_task(plant, plant_options, task_options)
         self.batch = SaccadeBatch(self.task, log_reward=log_reward)
         self.single_observation_space, self.single_action_space = self.batch.spaces()
@@ -74,7 +73,7 @@ class SaccadeVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Perform the saccades (num_envs, numbers) and begin new ones."""
-        rewards, ended = self.batch.perform(np.asarray(actions, dtype=float), self.np_random)
+        rewards, ended = self.batch.perform(actions, self.np_random)
         every = np.ones(self.num_envs, bool)
         infos = {"final_obs": ended, "_final_obs": every, "final_info": self.batch.described(), "_final_info": every}
         observations = self.batch.draw(self.num_envs, self.np_random)

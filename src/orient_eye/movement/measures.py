@@ -257,10 +257,10 @@ def _parabolic_peak(t: Array, values: Array) -> tuple[Array, Array]:
     """Largest value and its time, by the parabola through the largest sample and its neighbours."""
     top = values.argmax(axis=1)
     rows = np.arange(len(values))
-    inner = np.clip(top, 1, values.shape[1] - 2) if values.shape[1] > 2 else top
-    left, middle, right = (values[rows, np.clip(inner + k, 0, values.shape[1] - 1)] for k in (-1, 0, 1))
+    last = values.shape[1] - 1
+    left, middle, right = (values[rows, np.clip(top + k, 0, last)] for k in (-1, 0, 1))
     bend = left - 2 * middle + right
-    usable = (inner == top) & (bend < 0)
+    usable = (top > 0) & (top < last) & (bend < 0)
     shift = np.where(usable, 0.5 * (left - right) / np.where(usable, bend, -1.0), 0.0)
     value = np.where(usable, middle - 0.25 * (left - right) * shift, values[rows, top])
     step = t[1] - t[0] if len(t) > 1 else 0.0

@@ -57,7 +57,10 @@ UPDATES, EVALUATION_PAIRS = 7000, 60
 
 @runtime_checkable
 class Plant(Protocol):
-    """From a batch of motor commands to movements of the eye. Safe to use from several threads at once.
+    """From a batch of motor commands to movements of the eye.
+
+    Safe to share: several threads may use one plant at once, a forked child may go on with its parent's, and a pickled
+    or copied one is the same plant, `doubt` included. The results are those of one call after the other, bit for bit.
 
     Attributes:
         name: key in `PLANTS`.

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from orient_eye.checks import whole
 from orient_eye.constants import HORIZON_S
-from orient_eye.errors import InputError
 from orient_eye.eyes import model as eyes
 from orient_eye.motor import check_driven, ranges
 from orient_eye.plants import PulseRates, equilibrium
@@ -22,6 +22,7 @@ from orient_eye.rig import Rig
 from orient_eye.rotations import gaze, rotation
 
 Array = NDArray[np.float64]
+_MOST_THREADS = 1024
 _TURN = 1e-4  # rad, of the difference quotients of the torque
 
 
@@ -50,9 +51,7 @@ class ElasticPlant(SimulatedPlant):
         gravity: bool = False,
         rig: Rig | Limits | str | Path | None = None,
     ) -> None:
-        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 0:
-            raise InputError(f"threads are a whole number, 0 for one a core, got {threads!r}")
-        self.threads = int(threads)
+        self.threads = whole("threads", threads, 0, _MOST_THREADS, advice="0 is one a core")
         self.model = eyes.build_model(options["eye"], step_s=step_s, gravity=gravity, visual=False)
         own = eyes.motors(self.model)
         limits = {} if rig is None else limits_of(rig, own, self.name)
@@ -61,10 +60,11 @@ class ElasticPlant(SimulatedPlant):
         self.tendons = tuple(self.model.tendon(i).name for i in range(self.model.ntendon))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.options, "threads": self.threads}
+        return {"options": {**self.options, "threads": self.threads}, "doubt": self.doubt}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(**state)  # type: ignore[misc]  # models and compiled code are made again in the process
+        self.__init__(**state["options"])  # type: ignore[misc]  # models and compiled code are made again in the process
+        self.doubt = state["doubt"]
 
     def _fit_to_limits(self) -> None:
         """Horizon and bounds of pulses that suit limited motors; at the end of a constructor, as it asks torques."""
@@ -94,12 +94,8 @@ class ElasticPlant(SimulatedPlant):
         if found is None:
             return None
         excess = np.full(len(motor), np.nan)
-        excess[known] = found - self._fixations.force(gaze(orientation[known]))
+        excess[known] = found - Fixations.of(self).force(gaze(orientation[known]))
         return excess
-
-    @cached_property
-    def _fixations(self) -> Fixations:
-        return Fixations.of(self)
 
     @cached_property
     def _pairs(self) -> NDArray[np.intp] | None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
-from orient_eye.commands import Sampled, as_command
+from orient_eye.commands import Sampled, as_command, checked_step
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND, HORIZON_S, STEP_S
 from orient_eye.errors import InputError
@@ -45,7 +45,7 @@ _SETTLED = 10.0  # time constants after which nothing is left
 
 
 class LinearPlant(SimulatedPlant):
-    """The surrogate as a plant; see `orient_eye.plants.Plant`.
+    """The surrogate as a plant; see `orient_eye.plants.Plant`. Safe to share: nothing in it changes.
 
     Args:
         surrogate: its numbers, a file of them, or the name of a shipped one.
@@ -68,7 +68,7 @@ class LinearPlant(SimulatedPlant):
     ) -> None:
         numbers = surrogate if isinstance(surrogate, Surrogate) else Surrogate.load(surrogate)
         numbers = limited_surrogate(numbers, rig)
-        self.surrogate, self.step_s = numbers, step_s
+        self.surrogate, self.step_s = numbers, checked_step(step_s)
         bounds = numbers.range or (-_WORKING_DEG, _WORKING_DEG)
         motor = numbers.as_motor((max(bounds[0], -_WORKING_DEG), min(bounds[1], _WORKING_DEG)))
         self.motors = (motor,)

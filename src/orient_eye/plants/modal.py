@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.commands import checked_step
 from orient_eye.constants import HORIZON_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.modal_surrogate import ModalSurrogate, Mode, angular_velocity, as_orientation, as_vector, vector_rate
@@ -31,7 +32,7 @@ _NEARLY_SETTLED = 3.0  # time constants of the slowest mode: a good saccade is o
 
 
 class ModalPlant(SimulatedPlant):
-    """Three low-pass plants in parallel as a plant; see `orient_eye.plants.Plant`.
+    """Three low-pass plants in parallel as a plant; see `orient_eye.plants.Plant`. Safe to share: nothing changes.
 
     Args:
         surrogate: its numbers, a file of them, or the name of a shipped one.
@@ -45,7 +46,7 @@ class ModalPlant(SimulatedPlant):
 
     def __init__(self, surrogate: ModalSurrogate | str | Path = "thesis-3d", *, step_s: float = STEP_S) -> None:
         self.surrogate = surrogate if isinstance(surrogate, ModalSurrogate) else ModalSurrogate.load(surrogate)
-        self.step_s = step_s
+        self.step_s = checked_step(step_s)
         self.motors = self.surrogate.as_motors()
         self.resumes = not self.surrogate.dead_time  # else the eye remembers where its motors were
         slow = [min(map(complex, poles_of(mode)), key=abs) for mode in self.surrogate.modes.values()]
@@ -67,7 +68,7 @@ class ModalPlant(SimulatedPlant):
     def run(self, motor: Array, start: State) -> Run:
         """See `orient_eye.plants.simulated.SimulatedPlant`."""
         time = self.times(motor.shape[1])
-        with np.errstate(over="ignore", invalid="ignore"):  # of an absurd start, which is marked
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of an absurd start, which is marked
             at = as_vector(start.orientation)
             rate = vector_rate(at, start.angular_velocity)
             wanted, before = self._wanted(motor), self._wanted(start.motor)
@@ -116,10 +117,11 @@ class ModalPlant(SimulatedPlant):
     def _inverse(self, orientation: Array, driven: tuple[str, ...]) -> tuple[Array, Array]:
         """Positions (saccades, motors) that come nearest, the others at 0, and how far off they are [deg]."""
         index = check_driven(self.motors, driven, self.name)
-        vector = as_vector(orientation)
-        motor = np.zeros((len(vector), len(self.motors)))
-        motor[:, index] = vector @ np.linalg.pinv(self.surrogate.K[:, index]).T
-        return motor, np.asarray(np.linalg.norm(self._wanted(motor) - vector, axis=1))
+        with np.errstate(divide="ignore", invalid="ignore"):  # half a turn is not held
+            vector = as_vector(orientation)
+            motor = np.zeros((len(vector), len(self.motors)))
+            motor[:, index] = vector @ np.linalg.pinv(self.surrogate.K[:, index]).T
+            return motor, np.asarray(np.linalg.norm(self._wanted(motor) - vector, axis=1))
 
 
 def poles_of(mode: Mode) -> tuple[complex, ...]:

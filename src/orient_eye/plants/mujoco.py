@@ -6,18 +6,18 @@
 The thesis' integrator takes friction explicitly and holds each row of the command for one step. The
 accurate setting takes friction implicitly and holds the middle of each short step of the straight line
 between rows: against the converged solution that is 20 times nearer (`orient-eye validate`). Results do
-not depend on the number of threads. A plant may be used from several Python threads at once, and in a
-forked child.
+not depend on the number of threads.
 """
 
+import ctypes
 import os
 import threading
 import warnings
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -42,6 +42,8 @@ _RECORD_BYTES = 8e6  # of one chunk of saccades: stays near the caches, and boun
 
 class MujocoPlant(ElasticPlant):
     """The elastic eye of `eye_mjcf` as a plant; see `orient_eye.plants.Plant`.
+
+    Safe to share: each call has a batch of MuJoCo's of its own, and a forked child begins with none.
 
     Args:
         eye: preset, one of `orient_eye.eyes.EYES`, or an MJCF file of the same form.
@@ -202,17 +204,15 @@ class _Pool:
     def __init__(self, model: mujoco.MjModel, threads: int) -> None:
         self._model, self._threads = model, threads
         self._begin()
+        _POOLS.add(self)
 
     def _begin(self) -> None:
-        self._process, self._lock = os.getpid(), threading.Lock()
+        self._lock = threading.Lock()
         self._idle: dict[str, list[Batch]] = {}
 
     @contextmanager
     def batch(self, use: str, size: int) -> Iterator[Batch]:
         """A batch of that size, kept for the next call of the same use and size."""
-        if self._process != os.getpid():  # in a forked child the threads of these batches are not there
-            _ABANDONED.append(self._idle)
-            self._begin()
         with self._lock:
             idle = self._idle.setdefault(use, [])
             found = next((i for i, batch in enumerate(idle) if batch.nsim == size), None)
@@ -224,6 +224,28 @@ class _Pool:
             idle.insert(0, batch)
             del idle[_KEPT:]
 
+    def leave(self) -> None:
+        """In a forked child: its parent's batches are never used, nor freed, which would wait for their threads."""
+        for batch in (each for idle in self._idle.values() for each in idle):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(batch))
+        self._begin()
+
+
+def _leave_all() -> None:
+    for pool in list(_POOLS):
+        pool.leave()
+
 
 _KEPT = 2  # idle batches of a use
-_ABANDONED: list[Any] = []  # never freed: that would wait for threads that are not there
+_POOLS: "weakref.WeakSet[_Pool]" = weakref.WeakSet()
+os.register_at_fork(after_in_child=_leave_all)
+
+
+def _tell_only_the_console() -> None:
+    """Of steps that are unstable; unless told otherwise MuJoCo keeps a log in the working folder as well."""
+    config = mujoco.MjLogConfig.get()
+    config.logto_file = False
+    config.set()
+
+
+_tell_only_the_console()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.checks import real
 from orient_eye.commands import Command, as_command
 from orient_eye.constants import DOUBT, HORIZON_S, LONGEST_S, STEP_S
 from orient_eye.errors import InputError
@@ -18,7 +19,7 @@ from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import EVALUATION_PAIRS, UPDATES, Plant, PulseRates
 from orient_eye.plants.limited_motor import follow
 from orient_eye.rotations import FORWARD
-from orient_eye.state import State
+from orient_eye.state import LARGEST, State, sane
 
 if TYPE_CHECKING:
     import mujoco
@@ -265,12 +266,10 @@ class SimulatedPlant(ABC):
         """How many samples a movement has.
 
         Raises:
-            InputError: a horizon that is none.
+            InputError: a horizon that is none, or a command longer than any movement.
         """
-        if horizon_s is not None and not 0 < horizon_s <= LONGEST_S:
-            raise InputError(f"a horizon lies between 0 and {LONGEST_S:g} s, got {horizon_s}")
         told = (horizon_s, command.duration_s, self.horizon_s, HORIZON_S)
-        duration = next(seconds for seconds in told if seconds is not None)
+        duration = real("how long a movement lasts", next(s for s in told if s is not None), 0, LONGEST_S, unit="s")
         return round(duration / self.step_s) + 1
 
     def prepare(self, command: Command, start: State | None, horizon_s: float | None) -> "Given":
@@ -280,9 +279,8 @@ class SimulatedPlant(ABC):
             InputError: another number of motors or starts, or a written command outside the mechanical range.
         """
         told = command.sample(self.step_s, self.samples(command, horizon_s))
-        held, saturated = self._within_range(command, told)
-        failed = np.asarray(~np.isfinite(told).all(axis=(1, 2)))
-        held = np.where(failed[:, None, None], 0.0, held)
+        failed = np.asarray(~(np.abs(told) <= LARGEST).all(axis=(1, 2)))
+        held, saturated = self._within_range(command, np.where(failed[:, None, None], 0.0, told))
         if start is None:
             start = State(self.rest(held[:, 0]), held[:, 0])
         if start.motor.shape != (len(command), len(self.motors)):
@@ -290,7 +288,8 @@ class SimulatedPlant(ABC):
                 f"{len(command)} saccades of plant {self.name!r} start with as many eyes of {len(self.motors)} motors, "
                 f"got motor positions {start.motor.shape}"
             )
-        failed |= ~start.finite
+        begins = np.concatenate([start.orientation, start.motor, start.angular_velocity], axis=1)
+        failed |= np.isnan(sane(begins)).any(axis=1)
         begin = np.where(failed[:, None], 0.0, start.motor)
         motor, limited = follow(held, self.motors, self.step_s, begin)
         at = State(

@@ -7,7 +7,7 @@ It shares only the numbers of the MJCF with the MuJoCo plant: torque, integratio
 written from the thesis' equations 3.1 to 3.12 (`orient_eye.plants.elastic_kernel`; `tests/numpy_reference.py` has them
 in plain NumPy). The author's own program differs from a rigid body with viscous friction in four small ways, which the
 option `as_published` brings back: with them its runs come out to 0.0004 deg (`orient-eye validate`). Results do not
-depend on the number of threads. A plant may be used from several Python threads at once, and in a forked child.
+depend on the number of threads.
 """
 
 from pathlib import Path
@@ -28,6 +28,8 @@ _DECAY = 0.6  # of friction in an accurate step, at most
 
 class TavaresPlant(CompiledPlant):
     """The reference simulator as a plant; see `orient_eye.plants.Plant`.
+
+    Safe to share: the kernel holds no state, and each call has threads of its own.
 
     Args:
         eye: preset, one of `orient_eye.eyes.EYES`, or an MJCF file of the same form.

@@ -59,6 +59,8 @@ class Numbers:
 class UncertainPlant(LinearPlant):
     """The surrogate with numbers drawn evenly from intervals; see `orient_eye.plants.Plant`.
 
+    Safe to share; a random generator is not, so each thread brings its own.
+
     Args:
         nominal: the plant in the middle.
         intervals: low and high of K, w0, wn, zeta or dead_time [s]; a number without one keeps its value.

@@ -29,6 +29,8 @@ _APART = 10.0  # times as fast as the poles of the elastics those of the inertia
 class ViscousPlant(CompiledPlant):
     """An eye whose inertia is nothing beside its friction; see `orient_eye.plants.Plant`.
 
+    Safe to share: the kernel holds no state, and each call has threads of its own.
+
     Its angular velocity at each instant follows from orientation and motors: that of a start
     (`orient_eye.state.State`) is ignored. Within a step the motors count by their mean, and the samples lie on a cubic
     between its ends. Trajectories have no tension; `tension` tells it for any of their samples.
