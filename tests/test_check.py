@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from orient_eye.cli import main
 from orient_eye.cli.another_plant import AnotherPlant
 from orient_eye.cli.check import Check
 from orient_eye.cli.predict import Predict
@@ -159,7 +161,13 @@ def test_a_policy_is_held_to_its_own_prediction(
     command = tmp_path / "command.csv"
     there = AnotherPlant(None, {"rig": file})
     (told,) = Predict(policy, Saccades((0.0,), (20.0,)), command=command, another_plant=there).run()["saccades"]
-    assert "--plant lpf --surrogate SURROGATE.json --rig" in capsys.readouterr().err
+    assert "with the surrogate that the policy has learned on" in capsys.readouterr().err
+    surrogate = str(replace(MODEL, axis="yaw", rig=rig.to_plain()).save(tmp_path / "my surrogate.json"))
+    (tmp_path / "policy" / "run.json").write_text(json.dumps({"config": {"plant_options": {"surrogate": surrogate}}}))
+    Predict(policy, Saccades((0.0,), (20.0,)), command=command, another_plant=there).run()
+    typed = capsys.readouterr().err.replace("\n", " ").split("to try it: orient-eye ")[1].strip()
+    with pytest.raises(SystemExit, match="0"):
+        main([*shlex.split(typed), "--out", str(tmp_path / "tried")])
     with command.open() as rows:
         table = list(csv.DictReader(rows))
     sent = rig.from_driver("yaw", {name: np.array([float(row[name]) for row in table]) for name in table[0]})
@@ -175,7 +183,7 @@ def test_a_policy_is_held_to_its_own_prediction(
     assert result["advice"][0].startswith("as predicted")
     for who in ("predicted", "executed"):
         assert rows_of["duration"][who] == pytest.approx(told["duration_ms"], abs=15)
-    with pytest.raises(InputError, match=r"cannot be commanded by .*--rig RIG.toml"):
+    with pytest.raises(InputError, match=r"cannot be commanded by .*name its file by --rig"):
         Check(policy, command, executed).run()
     json.dumps(result)
 
@@ -220,6 +228,31 @@ def test_the_model_is_driven_by_the_measured_motor_also_where_its_first_rows_are
     result = Check(str(MODEL.save(tmp_path / "surrogate.json")), command, executed).run()
     assert result["model_rms_deg"] < 0.15
     assert result["residual_rms_deg"] > 0.5
+
+
+IN_OTHER_UNITS = {
+    "the eye in radians": (TOLD, eye_of(TOLD) / 57.29578, "the eye's angle comes to 0.5.* multiply by 57.29578"),
+    "another command's": (np.sin(20 * TIME), eye_of(np.sin(20 * TIME)) * 20, "the recording of another command"),
+    "an eye that stands": (TOLD, 0 * TOLD, "explains 0 % .* an eye that does not follow its motor"),
+}
+
+
+@pytest.mark.parametrize("what", IN_OTHER_UNITS)
+def test_a_recording_of_something_else_is_no_rig_with_a_bad_gain(what: str, tmp_path: Path) -> None:
+    motor, eye, words = IN_OTHER_UNITS[what]
+    command, executed = written(tmp_path / "c.csv", TOLD), written(tmp_path / "e.csv", motor, eye)
+    result = Check(str(MODEL.save(tmp_path / "surrogate.json")), command, executed).run()
+    with pytest.raises(AssertionError, match=words):
+        raise AssertionError(result["advice"][0])
+    assert "gain" not in " ".join(result["advice"])
+
+
+def test_a_recording_in_milliseconds_is_refused(tmp_path: Path) -> None:
+    command, executed = written(tmp_path / "c.csv", TOLD), tmp_path / "e.csv"
+    columns = np.column_stack([1000 * TIME, eye_of(TOLD)])
+    np.savetxt(executed, columns, delimiter=",", header="t_s,eye_deg", comments="")
+    with pytest.raises(InputError, match=r"240 rows are 5 s apart and last 1195 s: are these ms"):
+        Check(str(MODEL.save(tmp_path / "surrogate.json")), command, executed).run()
 
 
 def test_nothing_to_compare_is_refused() -> None:

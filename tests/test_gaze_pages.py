@@ -183,7 +183,7 @@ def test_evaluate_leaves_numbers_and_pictures_of_the_gaze(
 ) -> None:
     monkeypatch.setattr(evaluation, "searched_optimum", not_searched)
     usual(task).save(tmp_path / "policy")
-    with pytest.raises(InputError, match="at least 5"):
+    with pytest.raises(InputError, match="from 5 to 10000, got 4"):
         Evaluate(str(tmp_path / "policy"), pairs=4, out=tmp_path / "few").run()
     assert not (tmp_path / "few").exists()
     run = tmp_path / "run"

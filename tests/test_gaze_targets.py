@@ -159,10 +159,10 @@ def test_torsion_out_of_reach_is_refused() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"limit_deg": 0.0}, "within 90 deg of straight ahead, got 0.0"),
+        ({"limit_deg": 0.0}, "from 0.001 to 89 deg from straight ahead, got 0"),
         ({"limit_deg": float("nan")}, "got nan"),
         ({"limit_deg": 95.0}, "got 95"),
-        ({"torsion_deg": -1.0}, "torsion of starts lies between 0 and 90 deg, got -1"),
+        ({"torsion_deg": -1.0}, "torsion of starts must be a number from 0 to 89 deg, got -1"),
         ({"driven": ("motor2",)}, r"need all motors of plant 'modal' \(motor1, motor2, motor3\), got motor2; choose"),
         ({"driven": ("motor1", "motor2", "motor4")}, "cannot drive"),
     ],

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from bad_files import write_pool
 from orient_eye import rotations
 from orient_eye.cli.sysid import Sysid
 from orient_eye.errors import InputError
@@ -295,19 +297,50 @@ def test_lpf_returns_its_own_numbers() -> None:
         ((5.0, 0.0), "motor2", "step of 0 deg"),
         ((5.0, float("nan")), "motor2", "nan"),
         ((5.0, 5.0), "motor2", "twice"),
-        ((81.0,), "motor2", "outside the mechanical range of motor2, -80 to 80"),
+        ((5.0, 1e-300), "motor2", "a step of 1e-300 deg shows nothing"),
+        ((81.0,), "motor2", "from -80 to 80 deg, got 81; that is the mechanical range of motor2"),
+        ([1.0] * 1001, "motor2", "number of steps must be a whole number from 1 to 1000, got 1001"),
         ((5.0,), "motor7", "cannot drive .*motor7"),
     ],
 )
-def test_steps_a_plant_cannot_do_are_refused(amplitudes: tuple[float, ...], motor: str, words: str) -> None:
+def test_steps_a_plant_cannot_do_are_refused(amplitudes: Sequence[float], motor: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         identify_plant(make_plant("mujoco"), amplitudes, motor=motor)
+
+
+@pytest.mark.parametrize("amplitude", [1e308, 1e-300, 400.0])
+def test_a_motor_without_a_range_is_told_no_nonsense_either(amplitude: float) -> None:
+    with pytest.raises(InputError, match="step"):
+        identify_plant(make_plant("lpf"), [5.0, amplitude])
+    with pytest.raises(InputError, match="step"):
+        identify_plant(make_plant("lpf"), [5.0], [amplitude])
+
+
+def test_the_same_step_to_both_sides_says_as_little_as_one() -> None:
+    """Of how gains scatter over amplitudes: not +-0, as two gains that agree by symmetry would have it."""
+    plant = make_plant("tavares")
+    one, both = (identify_plant(plant, sizes).surrogate for sizes in ((5.0,), (5.0, -5.0)))
+    assert both.intervals["K"] == pytest.approx(one.intervals["K"], rel=1e-6)
+    assert np.diff(both.intervals["K"]) > 1e-4
+    three, six = (
+        identify_plant(plant, sizes).surrogate for sizes in ((4.0, 8.0, 12.0), (4.0, 8.0, 12.0, -4.0, -8.0, -12.0))
+    )
+    assert six.intervals["K"] == pytest.approx(three.intervals["K"], rel=1e-6)
 
 
 def test_steps_past_the_bend_are_warned_of() -> None:
     warning = plant_steps(make_plant("mujoco"), (40.0, 60.0)).warnings[0]
     assert warning.startswith("steps to 60 deg leave the working range of motor2, -40 to 40 deg")
     assert "bends over" in warning
+
+
+def test_a_recording_with_orientations_alone_is_identified(tmp_path: Path) -> None:
+    """Columns t_s, motor_deg and a quaternion, as docs/sysid.md has them: the same numbers as of the angle itself."""
+    pool = write_pool(tmp_path)
+    told = [Sysid(recording=(pool / name,), out=tmp_path / name[:-4]).run() for name in ("step.csv", "step_q.csv")]
+    assert (told[1]["K"], told[1]["w0"]) == pytest.approx((told[0]["K"], told[0]["w0"]), rel=1e-6)
+    assert told[1]["K"] == pytest.approx(1.47, rel=1e-3)
+    assert {f.name for f in (tmp_path / "step_q").iterdir()} >= {*told[1]["files"], "run.json"}
 
 
 # --- command --------------------------------------------------------------------------------------------

@@ -239,19 +239,22 @@ def _both(task: SaccadeTask, action: Array) -> tuple[Any, Array, Array]:
 @pytest.mark.parametrize(
     ("chosen", "message"),
     [
-        (ChosenSaccade(k0=18.0), "does not change around the chosen saccade"),  # no overshoot: singular
-        (ChosenSaccade(k0=10.0), "no positive weights make B = 35, D = 20.33, k0 = 10 optimal"),
-        (ChosenSaccade(B=float("nan")), "finite"),
-        (ChosenSaccade(target=(float("inf"),)), "finite"),
-        (ChosenSaccade((30.0,), (30.0,)), "begins and ends at .*30.* deg"),
-        (ChosenSaccade(target=(200.0,)), "between -180 and 180"),
-        (ChosenSaccade(D=(1.0, 2.0)), "one number for each of the 1 driven motors"),
-        (ChosenSaccade(B=-35.0), "B and k0 of the chosen saccade are positive"),
+        ({"k0": 18.0}, "does not change around the chosen saccade"),  # no overshoot: singular
+        ({"k0": 10.0}, "no positive weights make B = 35, D = 20.33, k0 = 10 optimal"),
+        ({"B": float("nan")}, r"B of the chosen saccade must be a number from 0\.01 to 10000 1/s, got nan"),
+        ({"B": -35.0}, "B of the chosen saccade must be .*, got -35"),
+        ({"B": 0.1}, r"step of the difference in B must be a number of at most 0\.09, got 0\.2; B is 0\.1 1/s"),
+        ({"target": (float("inf"),)}, "an angle of the chosen saccade must be a number from -180 to 180 deg, got inf"),
+        ({"target": (150.0,)}, "target at 150 deg: the eye of plant 'lpf' can be held between"),
+        ({"start": (30.0,), "target": (30.0,)}, "begins at .*30.* and ends at .*30.* deg"),
+        ({"target": (1e-300,)}, "choose another target"),
+        ({"D": (1.0, 2.0)}, "one number for each of the 1 driven motors"),
+        ({"D": (90.0,)}, "D of motor2 must be a number from -80 to 80 deg, got 90"),
     ],
 )
-def test_saccades_without_weights(chosen: ChosenSaccade, message: str) -> None:
+def test_saccades_without_weights(chosen: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        solve_weights(lpf_task(), chosen)
+        solve_weights(lpf_task(), ChosenSaccade(**chosen))
 
 
 def test_saccades_without_weights_on_the_whole_eye() -> None:
@@ -259,13 +262,25 @@ def test_saccades_without_weights_on_the_whole_eye() -> None:
     with pytest.raises(InputError, match=r"does not settle within 0\.1 s on plant 'mujoco'"):
         solve_weights(task_on(plant, horizon_s=0.1), ChosenSaccade(k0=17.0))
     with pytest.raises(InputError, match=r"overshoot does not set in between k0 = 5 and 40 1/s on plant 'mujoco'"):
-        solve_weights(task_on(plant, "2-fixed"), ChosenSaccade(target=(80.0,)))
+        solve_weights(task_on(plant, "2-fixed"), ChosenSaccade(B=5.0))
 
 
-@pytest.mark.parametrize("steps", [(0.0, 0.01, 0.05), (0.1, -1.0, 0.05), (0.1, 0.01, float("nan"))])
-def test_steps_must_be_positive(steps: tuple[float, float, float]) -> None:
-    with pytest.raises(InputError, match="must be positive"):
+@pytest.mark.parametrize("steps", [(0.0, 0.01, 0.05), (0.1, -1.0, 0.05), (0.1, 0.01, float("nan")), (1e308, 1, 1)])
+def test_steps_have_bounds(steps: tuple[float, float, float]) -> None:
+    with pytest.raises(InputError, match=r"the step of the difference in \w+ must be a number from 0.0001 to 5"):
         Steps(*steps)
+
+
+def test_a_saccade_up_comes_to_rest_within_its_horizon() -> None:
+    """Else no weights are known of it: the eye is slower up and down than to the sides."""
+    plant = TavaresPlant()
+    task = SaccadeTask.of_case(plant, "1", targets="vertical", weights=(1.0, 1.0, 1.0, 1.0))
+    start, target = saccades(task.targets, [[0.0]], [[-10.0]])
+    action = task.actions.likely(target)
+    action[:, 0::3], action[:, 2::3] = 35.0, 5.0
+    assert task.horizon_s == 0.7
+    assert task.perform(start, action, target).measures.settled.all()
+    assert SaccadeTask.of_case(plant, "1", weights=(1.0, 1.0, 1.0, 1.0)).horizon_s == 0.5
 
 
 # --- the command ----------------------------------------------------------------------------------
@@ -321,7 +336,7 @@ def test_where_4_4_5_has_no_solution_a_rule_says_what(tmp_path: Path, capsys: py
         ("--surrogate no-such-file", "no-such-file is no surrogate"),
         ("--plant mujoco --eye human", "unknown eye 'human'"),
         ("--band 0", "settling band"),
-        ("--step-k0 0", "must be positive"),
+        ("--step-k0 0", "difference in k0 must be a number from 0.0001 to 5, got 0"),
         ("--case 2-fixed --k0 25", "case 2-fixed: a term of the reward does not change"),
         ("--target 10 20", "--target takes YAW"),
         ("--C 50", "name the pulse too"),

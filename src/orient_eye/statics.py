@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import listing, rotations
+from orient_eye.checks import real
 from orient_eye.errors import InputError
 from orient_eye.motor import names
 from orient_eye.movement.oblique import toward
@@ -119,7 +120,12 @@ def degrees_per_motor(plant: Plant) -> Array:
 
 
 def cone(limit_deg: float) -> Array:
-    """Directions all over a cone around straight ahead, evenly, (n, 3)."""
+    """Directions all over a cone around straight ahead, evenly, (n, 3).
+
+    Raises:
+        InputError: a cone that is none.
+    """
+    real("the limit of a cone", limit_deg, 0.1, 90.0, unit="deg")
     line = np.linspace(-limit_deg, limit_deg, 2 * _POINTS + 1)
     shift = np.stack(np.meshgrid(line, line), axis=-1)
     return toward(shift[np.linalg.norm(shift, axis=-1) <= limit_deg + 1e-9])

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from orient_eye.checks import whole
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.plants import Plant
 from orient_eye.plants.mujoco import MujocoPlant
@@ -25,6 +26,8 @@ AUTHOR_LIMIT_DEG = 0.02
 HORIZONTAL_LIMIT_DEG = 0.001
 REFERENCE_LIMIT_DEG = 1e-4
 ACCURATE_LIMIT_DEG = 0.05
+MOST_RUNS = 10_000
+"""Random ones, which are simulated at once: 0.5 GB."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,12 @@ def validate(*, random_runs: int = 20, seed: int = 0) -> list[Check]:
     Args:
         random_runs: random pulse-steps of all three motors, beside the author's runs.
         seed: of those.
+
+    Raises:
+        InputError: a number of runs or a seed that is none.
     """
+    whole("the number of random runs", random_runs, 0, MOST_RUNS, advice="20 are usual")
+    whole("the seed", seed, 0)
     return [*against_author(), *against_reference(random_runs, np.random.default_rng(seed)), *against_truth()]
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from orient_eye.checks import DEG, likely_milliseconds, real
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from orient_eye.tables import Table
 
 _OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
+_SAMPLED = 3  # rows of a recording that say how far apart they are
+_EXPLAINED = 0.8  # share of the eye's movement that the prediction explains: a rig's faults leave 0.95
+_FACTOR = 1.6  # up or down: as far as the gain of a rig may be off beside that of its unit
+_LARGE = 1e5  # deg: nothing turns so far
 _CLOCK_S = 1.0  # a recording that begins later than this has a clock of its own
 
 
@@ -92,11 +97,12 @@ class Check:
         _say_rest(held, band)
         if executed.motor_deg is None and told is not None:
             say("note: the recording has no motor positions, so motor and eye cannot be told apart", "yellow")
-        for advice in held.advice:
-            say(advice, "bold")
+        advice = _doubts(held, executed) or held.advice
+        for words in advice:
+            say(words, "bold")
         if self.out:
             say(f"in {write_table(self.out, rows)}")
-        result = {**asdict(held), "advice": list(held.advice)}
+        result = {**asdict(held), "advice": list(advice)}
         del result["rows"]
         return {"model": self.model, "axis": axis, "quantities": rows, "band": band, **result}
 
@@ -142,7 +148,9 @@ class Check:
         except InputError as error:
             if wired is not None:
                 raise
-            raise InputError(f"{error}. A command for a rig's driver is read with its rig: --rig RIG.toml") from error
+            raise InputError(
+                f"{error}. A command for a rig's driver is read with its rig: name its file by --rig"
+            ) from error
 
     def _clock(self, recorded: "Table") -> Any:
         """Times of the recording on the command's clock [s], (rows,).
@@ -153,9 +161,11 @@ class Check:
         from orient_eye.sysid.recordings import times_of
 
         time = times_of(recorded)
-        begins = self.sent_at
-        if begins is None:
-            begins = 0.0 if time[0] <= _CLOCK_S else float(time[0])
+        if asked := likely_milliseconds(len(time), float(time[-1] - time[0]), many=_SAMPLED):
+            raise InputError(f"{self.executed}: {asked}")
+        begins = 0.0 if time[0] <= _CLOCK_S else float(time[0])
+        if self.sent_at is not None:
+            begins = real("--sent-at", self.sent_at, unit="s")
         if not begins < time[-1]:
             raise InputError(f"{self.executed} ends at {time[-1]:g} s, before the command is sent at {begins:g} s")
         return time - begins
@@ -175,7 +185,38 @@ class Check:
         elif len(plant.motors) == 1:
             column = next((c for c in (plant.motors[0].column, "motor_deg") if c in recorded), None)
             motor = None if column is None else recorded[column]
+        for what, values in (("the eye", eye), ("the motor", motor)):
+            if values is not None and not abs(values).max() <= _LARGE:
+                raise InputError(f"{self.executed}: {what} turns by {abs(values).max():.3g} deg; angles are in deg")
         return Saccade(time, eye, motor)
+
+
+def _doubts(held: "Held", executed: "Saccade") -> list[str]:
+    """What the recording probably is instead; where nothing says so, nothing.
+
+    An eye in radians would pass for one of a tiny gain, and another command's saccade for a shape that differs.
+    """
+    import numpy as np
+
+    told = {row.name: row for row in held.rows}
+    found = []
+    for what, row in (("eye's angle", told["movement"]), ("motor's position", told.get("motor end"))):
+        if row is None or row.predicted is None or row.executed is None or abs(row.predicted) < 1:
+            continue
+        share = DEG * row.executed / row.predicted
+        if 1 / _FACTOR < share < _FACTOR:
+            found.append(
+                f"the {what} comes to {row.executed:.3g} where {row.predicted:.3g} deg were predicted: is it in "
+                f'radians? It is read in deg; multiply by {DEG:.7g} (for the motor a rig can say it: unit = "rad")'
+            )
+    moved = float(np.std(executed.eye_deg))
+    if not found and held.left_rms_deg**2 > (1 - _EXPLAINED) * moved**2:
+        found.append(
+            f"the prediction explains {max(100 * (1 - (held.left_rms_deg / max(moved, 1e-9)) ** 2), 0):.0f} % of how "
+            "the eye moved: is this the recording of another command, or of an eye that does not follow its motor? "
+            "Nothing else can be told from it"
+        )
+    return found
 
 
 def _answer(surrogate: "Surrogate | None", executed: "Saccade", predicted: "Saccade") -> Any:

@@ -8,6 +8,9 @@ import tyro
 
 from orient_eye.cli.another_plant import AnotherPlant
 
+MOST = 10_000
+"""Saccades."""
+
 
 @dataclass(frozen=True)
 class Evaluate:
@@ -40,10 +43,10 @@ class Evaluate:
         """Search the optimum, measure the policy, and write the run directory."""
         from dataclasses import asdict
 
+        from orient_eye.checks import whole
         from orient_eye.cli.learned import say_gaze, say_result
         from orient_eye.cli.places import policy_file
         from orient_eye.cli.tables import say, say_limits
-        from orient_eye.errors import InputError
         from orient_eye.files import write_table
         from orient_eye.learning.directions import in_all_directions
         from orient_eye.learning.evaluation import evaluation_saccades
@@ -61,8 +64,7 @@ class Evaluate:
         count = usual if self.pairs is None else self.pairs
         gaze = in_all_directions(task)
         least = PLANE_OF if gaze else 1
-        if count < least:
-            raise InputError(f"--pairs must be at least {least}, got {count}")
+        whole("--pairs", count, least, MOST, advice="for each the best saccade is searched")
         run = RunDirectory.create(self.out, "evaluate", {**asdict(self), "pairs": count})
         with progress_bar("searching the optimum", quiet=self.quiet) as advance:
             carried = policy_file(self.policy).with_name(NAME)

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from orient_eye.checks import real, whole
 from orient_eye.cli.another_plant import AnotherPlant
+from orient_eye.cli.saccades import direction
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 _LIMIT_DEG = 30.0
 _HORIZON_S = 1.5  # of the saccades of a sequence
 _SHOWN = 12  # saccades of a sequence
+_MOST = 10_000  # saccades of all sequences
 _COLUMNS = 4  # saccades beside each other
 
 
@@ -51,7 +54,7 @@ class Listing:
         str | None, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY", help_behavior_hint="(optional)")
     ] = None
     """Run directory, policy folder, or name of a shipped policy."""
-    gaze: Annotated[tuple[float, float] | None, _asked("YAW PITCH")] = None
+    gaze: Annotated[tuple[float, ...] | None, _asked("YAW PITCH")] = None
     """Which motors hold this direction, deg, positive to the left and down; at the torsion of the least force, or at
     --torsion."""
     torsion: Annotated[float | None, _asked("ANGLE")] = None
@@ -88,7 +91,7 @@ class Listing:
             raise InputError(f"{given[0]} and {given[1]} ask different questions; give one of them")
         plant = self._plant()
         if self.gaze is not None:
-            return self._hold(plant, *self.gaze)
+            return self._hold(plant, *direction(("yaw_deg", "pitch_deg"), self.gaze, "gaze"))
         if self.motors is not None:
             return _rest(plant, self.motors)
         return self._statics(plant)
@@ -110,10 +113,8 @@ class Listing:
         from orient_eye.motor import names
         from orient_eye.statics import Held
 
-        if not (abs(yaw) <= 90 and abs(pitch) <= 90) or not abs(self.torsion or 0.0) <= 90:
-            raise InputError(
-                f"yaw, pitch and torsion lie within 90 deg of 0, got {yaw}, {pitch}, {self.torsion or 0.0}"
-            )
+        for name, angle in (("yaw", yaw), ("pitch", pitch), ("torsion", self.torsion or 0.0)):
+            real(name, angle, -90.0, 90.0, unit="deg")
         held = Held.of(plant, directions([yaw], [pitch]))
         least, largest = held.range[0]
         if np.isnan(least):
@@ -160,8 +161,8 @@ class Listing:
         limit = _LIMIT_DEG if self.limit is None else self.limit
         space = statics.Workspace.of(plant)
         largest = float(space.reach_deg.min())
-        if not 0 < limit <= largest:
-            raise InputError(f"--limit lies above 0 and up to {largest:.1f} deg, which the motors hold, got {limit:g}")
+        can = f"the motors hold every direction up to {largest:.1f} deg"
+        real("--limit", limit, 1.0, largest, unit="deg", advice=can)
         run = RunDirectory.create(self.out, "listing", {**asdict(self), "limit": limit})
         held = statics.Held.of(plant, statics.cone(limit))
         rows = _held_rows(plant, _corners(plant, limit))
@@ -211,11 +212,11 @@ class Listing:
         from orient_eye.task.table import rows_of
         from orient_eye.words import plant_in_words
 
-        if self.seed < 0 or self.saccades * self.sequences < made_by.FEWEST:
-            raise InputError(
-                f"a plane is fitted through {made_by.FEWEST} saccades or more, and a seed is 0 or more; got "
-                f"{self.sequences} sequences of {self.saccades} saccades and seed {self.seed}"
-            )
+        whole("--seed", self.seed, 0)
+        whole("--sequences", self.sequences, 1, _MOST)
+        fewest = -(-made_by.FEWEST // self.sequences)
+        plane = f"a plane is fitted through {made_by.FEWEST} saccades or more, and {_MOST} take 1 GB"
+        whole("--saccades", self.saccades, fewest, _MOST // self.sequences, advice=plane)
         policy = Policy.load(name)
         task, differences = self.another_plant.task(policy)
         random = np.random.default_rng(self.seed)
@@ -273,9 +274,7 @@ def _rest(plant: "Plant", position: tuple[float, ...]) -> dict[str, Any]:
         told = ", ".join(names(plant.motors))
         raise InputError(f"plant {plant.name!r} has {len(plant.motors)} motors ({told}), got {len(position)} positions")
     for motor, where in zip(plant.motors, position, strict=True):
-        low, high = motor.range
-        if not low <= where <= high:
-            raise InputError(f"{motor.name} turns from {low:g} to {high:g} {motor.unit}, got {where:g}")
+        real(motor.name, where, *motor.range, unit=motor.unit, advice="that is how far it turns")
     at = np.array([position], dtype=float)
     orientation = plant.rest(at)
     yaw, pitch, _ = (float(angle[0]) for angle in to_euler(orientation))

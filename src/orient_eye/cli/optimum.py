@@ -65,7 +65,7 @@ class Optimum:
         check_outputs({"--out": self.out}, {"--pairs": self.saccades.pairs})
         case = self.problem.case(self.case)
         plant, targets = self.problem.made()
-        start, target = saccades(targets, *self.saccades.angles(targets))
+        start, target = saccades(targets, *self.saccades.angles(targets, moving=True))
         refuse_no_saccade(start, target)
         own = self.problem.task(plant, targets, case, self.weights)
         best, remembered = self._search(own, start, target)

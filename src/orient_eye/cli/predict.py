@@ -106,6 +106,7 @@ class Predict:
             InputError: says which.
         """
         from orient_eye.errors import InputError
+        from orient_eye.files import explained
 
         for option, path, what in (
             ("--command", self.command, "the motor command"),
@@ -116,12 +117,10 @@ class Predict:
                     f"{option} writes {what} of one saccade, {self.saccades.pairs} has {saccades}; --commands FOLDER "
                     "writes the commands of many"
                 )
-        if (
-            self.commands
-            and self.commands.exists()
-            and not (self.commands.is_dir() and next(self.commands.iterdir(), None) is None)
-        ):
-            raise InputError(f"--commands {self.commands} is not an empty folder; name a new one")
+        if self.commands:
+            with explained(self.commands):
+                if self.commands.exists() and (not self.commands.is_dir() or any(self.commands.iterdir())):
+                    raise InputError(f"--commands {self.commands} is not an empty folder; name a new one")
 
     def _write(
         self,
@@ -136,16 +135,10 @@ class Predict:
         from orient_eye.cli.tables import say
 
         written, plant = [], task.plant
-        surrogate = getattr(plant, "surrogate", None)
-        stranger = surrogate is not None and surrogate.eye is None  # whose motors are none of the default plant's
-        where = f" --plant {plant.name}" if stranger or wired is not None else ""
-        where += " --surrogate SURROGATE.json" if stranger else ""
-        where += "" if wired is None else f" --rig {self.another_plant.plant_options['rig']}"
-        where += "" if wired is None else f" --horizon {task.horizon_s:g}"  # its file ends where the motors stand
         if self.command:
             written.append(write(self.command, plant, wired, written_path(task, outcome, start, 0, wired)))
             written[-1].say("motor command")
-            say(f"to try it: orient-eye simulate --motor {self.command}{where}")
+            say(f"to try it: {self._to_try(task, limited=wired is not None)}")
         if self.back:
             motors, step_s = (plant.motors, plant.step_s) if wired is None else (wired.limited, wired.step_s)
             back = way_back(final_of(plant, outcome, 0), motors, step_s)
@@ -154,6 +147,39 @@ class Predict:
         if self.commands:
             written += self._write_all(self.commands, task, outcome, start, rows, wired)
         return written
+
+    def _to_try(self, task: "SaccadeTask", *, limited: bool) -> str:
+        """The command that simulates the written one, as it can be typed."""
+        import shlex
+
+        words = ["orient-eye", "simulate", "--motor", str(self.command)]
+        surrogate = getattr(task.plant, "surrogate", None)
+        stranger = surrogate is not None and surrogate.eye is None  # whose motors are none of the default plant's
+        file = self._surrogate_file() if stranger else None
+        if stranger and file is None:
+            return f"{shlex.join(words)}, with the surrogate that the policy has learned on (--surrogate and its file)"
+        if stranger or limited:
+            words += ["--plant", task.plant.name]
+        if file is not None:
+            words += ["--surrogate", file]
+        if limited:  # the file ends where the motors stand
+            words += ["--rig", str(self.another_plant.plant_options["rig"]), "--horizon", f"{task.horizon_s:g}"]
+        return shlex.join(words)
+
+    def _surrogate_file(self) -> str | None:
+        """The surrogate that was given, or that the policy's run directory says it has learned on; None if unknown."""
+        from orient_eye.cli.places import policy_file
+        from orient_eye.errors import InputError
+        from orient_eye.run_directory import RunDirectory
+
+        named = self.another_plant.plant_options.get("surrogate")
+        if named is None:
+            try:
+                config = RunDirectory(policy_file(self.policy).parent).read_json("run.json")["config"]
+                named = config["plant_options"]["surrogate"]
+            except (InputError, KeyError, TypeError):  # a policy by itself, or another's run
+                return None
+        return str(named) if Path(str(named)).is_file() else None
 
     def _write_all(
         self,

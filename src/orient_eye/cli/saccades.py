@@ -35,34 +35,44 @@ class Saccades:
     """Many saccades instead: a CSV file with the columns start_yaw_deg and target_yaw_deg, for gaze targets
     start_pitch_deg and target_pitch_deg too."""
 
-    def angles(self, targets: "Targets", *, drawn: bool = False) -> "tuple[Array, Array]":
+    def angles(self, targets: "Targets", *, drawn: bool = False, moving: bool = False) -> "tuple[Array, Array]":
         """Angles [deg] (saccades, angles) of starts and targets.
 
         Args:
             targets: of the task.
             drawn: refuse also what the targets never draw.
+            moving: refuse also saccades that end where they start.
 
         Raises:
-            InputError: both or neither are given, other numbers of angles, or what `Targets.check` refuses.
+            InputError: both or neither are given, other numbers of angles, or what `Targets.check` refuses; of a table
+                with the line.
         """
         import numpy as np
 
         if self.pairs is not None and (self.start is not None or self.target is not None):
             raise InputError("give --pairs, or --start and --target, not both")
         if self.pairs is not None:
-            ends = read_pairs(self.pairs, targets.angles)
+            ends, lines = _read(self.pairs, targets.angles)
         elif self.target is None:
             raise InputError(
                 f"name a saccade by --start and --target ({_told(targets.angles)}), or many by --pairs FILE.csv"
             )
         else:
             begin = (0.0,) * len(targets.angles) if self.start is None else self.start
-            ends = (
-                np.array([direction(targets.angles, begin, "start")]),
-                np.array([direction(targets.angles, self.target, "target")]),
-            )
+            given = {"start": begin, "target": self.target}
+            start, target = (np.array([direction(targets.angles, given[what], what)]) for what in given)
+            ends, lines = (start, target), ()
         for what, angles in zip(("start", "target"), ends, strict=True):
-            targets.check(angles, what, drawn=drawn)
+            try:
+                targets.check(angles, what, drawn=drawn)
+            except InputError:
+                for line, one in zip(lines, angles, strict=False):  # which it was; none where there is no table
+                    targets.check(one[None], f"{self.pairs}, line {line}: {what}", drawn=drawn)
+                raise
+        still = (ends[0] == ends[1]).all(axis=1).nonzero()[0]
+        if moving and len(still):
+            named = f"{self.pairs}, line {lines[still[0]]}: the saccade" if lines else "saccade 1"
+            raise InputError(f"{named} starts at its target: a saccade goes from one direction to another")
         return ends
 
 
@@ -83,11 +93,16 @@ def read_pairs(path: Path, angles: tuple[str, ...]) -> "tuple[Array, Array]":
     Raises:
         InputError: unreadable, a column missing, no rows, or cells that are no finite numbers.
     """
+    return _read(path, angles)[0]
+
+
+def _read(path: Path, angles: tuple[str, ...]) -> "tuple[tuple[Array, Array], tuple[int, ...]]":
+    """The same, and the line of each."""
     from orient_eye.tables import read_table
 
     names = [tuple(f"{what}_{angle}" for angle in angles) for what in ("start", "target")]
     table = read_table(path, ",".join(names[0] + names[1]))
-    return table.stack(names[0]), table.stack(names[1])
+    return (table.stack(names[0]), table.stack(names[1])), table.lines
 
 
 def refuse_no_saccade(start: "State", target: "Array") -> None:
@@ -96,7 +111,6 @@ def refuse_no_saccade(start: "State", target: "Array") -> None:
     Raises:
         InputError: says which.
     """
-    from orient_eye.errors import InputError
     from orient_eye.rotations import angle_between
 
     for i in (angle_between(start.orientation, target) == 0).nonzero()[0]:

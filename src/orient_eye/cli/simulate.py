@@ -38,10 +38,10 @@ class Simulate:
         """Simulate and write the run directory."""
         import numpy as np
 
+        from orient_eye.checks import likely_radians, real
         from orient_eye.cli.tables import say
         from orient_eye.commands.motor_file import read_command
-        from orient_eye.constants import LONGEST_S
-        from orient_eye.errors import InputError
+        from orient_eye.constants import LONGEST_S, STEP_S
         from orient_eye.figures.trajectory import draw_trajectory
         from orient_eye.plants import make_plant
         from orient_eye.plants.limited_motor import peaks
@@ -51,8 +51,8 @@ class Simulate:
         from orient_eye.run_directory import RunDirectory
         from orient_eye.state import State
 
-        if self.horizon is not None and not 0 < self.horizon <= LONGEST_S:
-            raise InputError(f"--horizon lies between 0 and {LONGEST_S:g} s, got {self.horizon:g}")
+        if self.horizon is not None:
+            real("--horizon", self.horizon, STEP_S, LONGEST_S, unit="s")
         plant = make_plant(self.plant, **self.plant_options)
         rig = self.plant_options.get("rig")
         wired = None if rig is None else wiring(plant, rig)
@@ -60,6 +60,8 @@ class Simulate:
         movement = plant.move(command, State(plant.rest(command.rest), command.rest), self.horizon)
         trajectory = movement.trajectory()
         run = RunDirectory.create(self.out, "simulate", self)
+        if asked := likely_radians(f"{self.motor}: the motor", float(np.abs(command.positions).max())):
+            say(f"note: {asked}", "yellow")
         trajectory.save_npz(run.path / "trajectory.npz")
         trajectory.to_csv(run.path / "trajectory.csv")
         draw_trajectory(trajectory, run.path / "trajectory.png")

@@ -145,7 +145,8 @@ class Sysid:
                 f"these data do not determine the surrogate, so none was written (fits and pictures are in {folder}): "
                 f"{found.surrogate_model.title}: {'; '.join(found.undetermined)}. Record several steps of different "
                 "size in both directions, each with a rest before, the motor's measured position at 100 rows a second "
-                "or more, until the eye stands (orient-eye sysid --plan --rig RIG.toml writes such steps); or choose "
+                f"or more, until the eye stands (orient-eye sysid --plan --rig {self.rig or f'{folder}/rig.toml'} "
+                "writes such steps, once the rig's motors have their range in it); or choose "
                 "a simpler --model; or say --force"
             )
 
@@ -158,14 +159,17 @@ class Sysid:
         from orient_eye.sysid.plan import plan_steps, write_plan
 
         if self.rig is None:
-            raise InputError("--plan needs the rig, whose limits it keeps: --rig RIG.toml (docs/rigs.md shows one)")
+            raise InputError(
+                "--plan needs the rig, whose limits it keeps: --rig and its file (docs/rigs.md shows one), or --rig "
+                "prototype"
+            )
         if self.recording is not None:
             raise InputError("--plan writes what to record; leave --recording out")
         rig = Rig.load(self.rig)
         axis = axis_of(rig, self.axis)
         steps = plan_steps(rig, axis)
         run = RunDirectory.create(self.out, "sysid-plan", {"rig": self.rig, "axis": axis, "plan": True})
-        files = write_plan(steps, rig, axis, run.path)
+        files = write_plan(steps, rig, axis, run.path, self.rig)
         rows = [
             {"file": f"{s.name}.csv", "amplitude_deg": s.amplitude_deg, "until_s": s.until_s, "s": float(s.time[-1])}
             for s in steps

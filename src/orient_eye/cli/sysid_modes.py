@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from orient_eye.checks import whole
 from orient_eye.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def modes_of(command: "Sysid") -> dict[str, Any]:
         )
     limits = {} if command.rig is None else {"rig": command.rig}
     plant = make_plant(command.plant, **command.plant_options, **limits)
-    seed = command.seed or 0
+    seed = whole("--seed", command.seed or 0, 0)
     found = identify_modes(plant, np.random.default_rng(seed), order=_MODELS[command.model])
     run = RunDirectory.create(command.out, "sysid", command, seed=seed)
     found.surrogate.save(run.path / SURROGATE)

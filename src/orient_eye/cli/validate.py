@@ -21,11 +21,8 @@ class Validate:
         from rich.text import Text
 
         from orient_eye.cli.tables import column, say, table
-        from orient_eye.errors import InputError
         from orient_eye.validation import passed, validate
 
-        if self.random_runs < 0 or self.seed < 0:
-            raise InputError(f"--random-runs and --seed must not be negative, got {self.random_runs} and {self.seed}")
         checks = validate(random_runs=self.random_runs, seed=self.seed)
         rows = [{**asdict(check), "passed": check.passed} for check in checks]
         columns = {

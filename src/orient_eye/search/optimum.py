@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from orient_eye.errors import InputError
+from orient_eye.checks import real
 from orient_eye.search.evolution import evolve
 from orient_eye.search.simplex import around, climb
 from orient_eye.state import State
@@ -107,8 +107,7 @@ def find_optimum(
     Raises:
         InputError: an effort that is none.
     """
-    if not 0 < effort < np.inf:
-        raise InputError(f"the effort of a search is a number above 0, 1 for the usual one, got {effort}")
+    real("the effort of a search", effort, 0.01, 1000.0, advice="1 is the usual one")
     usual, task, twin = task.actions, task.plain, task.plant.twin()
     if usual is not task.actions:
         twin = copy.copy(task.plant) if twin is None else twin

@@ -119,17 +119,18 @@ def identify_plant(
         InputError: see `plant_steps` and `fit_model`.
     """
     model = model or ("first_order" if plant.pulse_rates is None else "best")
-    asked = [float(a) for a in amplitudes]
+    asked = list(amplitudes)
     if not asked:
         raise InputError("no step amplitude given; name at least one, in deg of motor, as 5 10 20")
-    done = plant_steps(plant, [*asked, *(float(a) for a in held_out if float(a) not in asked)], motor, axis)
+    done = plant_steps(plant, [*asked, *(a for a in held_out if a not in asked)], motor, axis)
     steps, judges = done.steps[: len(asked)], done.steps[len(asked) :]
     fits = tuple((fit_model(MODELS["first_order"], [step]),) for step in steps)
-    A = np.array(asked)
+    A = np.array(asked, float)
     K = np.array([fit["K"].value for (fit,) in fits])
     gain = float(np.sum(K * A**2) / np.sum(A**2))
-    scatter = np.sqrt(np.sum((A * (K - gain)) ** 2) / max(len(A) - 1, 1) / np.sum(A**2))
-    half = stats.t.ppf((1 + CONFIDENCE) / 2, len(A) - 1) * scatter if len(A) > 1 else fits[0][0]["K"].half_width
+    sizes = len(np.unique(np.abs(A)))  # the same step to the other side says nothing new of how gains scatter
+    scatter = np.sqrt(np.sum((A * (K - gain)) ** 2) / max(sizes - 1, 1) / np.sum(A**2))
+    half = stats.t.ppf((1 + CONFIDENCE) / 2, sizes - 1) * scatter if sizes > 1 else fits[0][0]["K"].half_width
     nearest = int(np.abs(np.abs(A) - REFERENCE_DEG).argmin())
     w0 = fits[nearest][0]["w0"]
     compared = compare(steps, judges)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from orient_eye.checks import real, whole
 from orient_eye.commands import Command, Sampled
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import YAW_LIMIT_DEG
@@ -42,6 +43,8 @@ WORKSPACE_DEG, TORSION_DEG = YAW_LIMIT_DEG, 3.0
 """Starts and ends look up to here from straight ahead, with a torsion up to here, by the gains there."""
 DURATION_S = 0.7
 """Of each response."""
+MOST = 10_000
+"""Pulse-steps that are simulated at once: 0.5 GB."""
 RINGS_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, np.inf)
 """Ends of the rings of eccentricity."""
 _STEP_DEG = 1.0  # of a motor, to see which way it turns the eye
@@ -145,8 +148,9 @@ def identify_modes(
     """
     if order not in ("best", *ORDERS):
         raise InputError(f"an order is best, {', '.join(ORDERS)}, got {order!r}")
-    if min(fitted, held_out) < 1:
-        raise InputError(f"at least one pulse-step is fitted and one held out, got {fitted} and {held_out}")
+    for name, count in (("fitted", fitted), ("held out", held_out)):
+        whole(f"the number of pulse-steps {name}", count, 1, MOST, advice="200 and 400 are usual")
+    real("what a second order is worth", worth, 0, 1, advice="it is a share of the first order's error")
     slope = _slope(plant)
     K = _gains(plant, slope, random)
     rates = [mode.w0 for mode in _fit(_steps(plant, slope, random), K, "first_order").values()]

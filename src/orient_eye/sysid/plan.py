@@ -2,7 +2,7 @@
 
 plan = plan_steps(rig, "yaw")
 plan[0].time, plan[0].drive                      # rest, step, hold, slowly back
-write_plan(plan, rig, "yaw", folder)             # one table a step, and how to record
+write_plan(plan, rig, "yaw", folder, "rig.toml") # one table a step, and how to record
 """
 
 from collections.abc import Sequence
@@ -113,10 +113,12 @@ def _rise(motor: Motor, size: float, step_s: float) -> Array:
     return np.asarray(np.minimum(there, size))
 
 
-def write_plan(steps: Sequence[PlannedStep], rig: Rig, axis: str, folder: Path) -> list[str]:
+def write_plan(
+    steps: Sequence[PlannedStep], rig: Rig, axis: str, folder: Path, rig_file: str = "rig.toml"
+) -> list[str]:
     """Write one table a step, columns t_s and those of all motors in the driver's units, and README.md.
 
-    Numbers in counts are whole.
+    Numbers in counts are whole. README.md says what to run then, with the file of the rig.
 
     Returns:
         Names of the files.
@@ -131,11 +133,11 @@ def write_plan(steps: Sequence[PlannedStep], rig: Rig, axis: str, folder: Path) 
         ]
         write_table(folder / f"{step.name}.csv", rows)
         files.append(f"{step.name}.csv")
-    write_text(folder / "README.md", how_to_record(steps, rig, axis))
+    write_text(folder / "README.md", how_to_record(steps, rig, axis, rig_file))
     return [*files, "README.md"]
 
 
-def how_to_record(steps: Sequence[PlannedStep], rig: Rig, axis: str) -> str:
+def how_to_record(steps: Sequence[PlannedStep], rig: Rig, axis: str, rig_file: str) -> str:
     """How to record these steps, and what to run then; Markdown."""
     motor = rig.drive(axis)
     columns = ", ".join(rig.motor(name).column for name in rig.axes[axis])
@@ -168,5 +170,5 @@ For each table:
 The first half second is rest, and is needed: movements are measured from it. After {until:.3f} s the way back begins,
 which `--until` leaves out:
 
-    orient-eye sysid --rig RIG.toml --axis {axis} --until {until:.3f} --recording {names}
+    orient-eye sysid --rig {rig_file} --axis {axis} --until {until:.3f} --recording {names}
 """

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.checks import real, whole
 from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.motor import Motor, check_driven
@@ -18,6 +19,7 @@ from orient_eye.sysid.step_response import StepResponse, axis_angle
 Array = NDArray[np.float64]
 DURATION_S = 0.8
 """Of each response, as in the thesis author's program."""
+_MOST, _LEAST_DEG = 1000, 0.01  # steps, and how small one may be to be a step
 _TURNS_DEG = 1e-3  # of the eye for a motor at 1: less is rounding
 _ALIKE = 1e-6  # of motors that mirror each other, the first
 
@@ -51,7 +53,7 @@ def plant_steps(
 
     Args:
         plant: any of `orient_eye.plants.PLANTS`.
-        amplitudes: in the motor's unit, not 0, inside its mechanical range.
+        amplitudes: in the motor's unit, 0.01 or more to either side, inside its mechanical range.
         motor: name of the motor that steps; None for the one that turns the eye most purely about the axis.
         axis: angle of the eye that is watched: yaw, pitch or roll; None for the angle that the motor turns most, or
             without a motor the first of these three that the plant turns.
@@ -105,16 +107,13 @@ def _chosen(plant: Plant, motor: str | None, axis: str | None) -> tuple[str, str
 
 
 def _checked(amplitudes: Sequence[float], motor: Motor) -> list[float]:
-    values = [float(a) for a in amplitudes]
-    low, high = motor.range
+    whole("the number of steps", len(amplitudes), 1, _MOST, advice="each is fitted by itself; name fewer")
+    low, high = np.clip(motor.range, -360.0, 360.0)
+    beyond = f"that is the mechanical range of {motor.name}; choose smaller amplitudes"
+    values = [real("the amplitude of a step", a, low, high, unit=motor.unit, advice=beyond) for a in amplitudes]
     for a in values:
-        if a == 0 or not np.isfinite(a):
-            raise InputError(f"a step of {a:g} {motor.unit} shows nothing; amplitudes are finite and not 0")
-        if not low <= a <= high:
-            raise InputError(
-                f"a step of {a:g} {motor.unit} is outside the mechanical range of {motor.name}, {low:.0f} to "
-                f"{high:.0f} {motor.unit}; choose smaller amplitudes"
-            )
+        if abs(a) < _LEAST_DEG:
+            raise InputError(f"a step of {a:g} {motor.unit} shows nothing; choose {_LEAST_DEG:g} {motor.unit} or more")
     if len(set(values)) != len(values):
         raise InputError(f"an amplitude is named twice among {', '.join(f'{a:g}' for a in values)}; name each once")
     return values

@@ -14,6 +14,7 @@ from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 
 Array = NDArray[np.float64]
+_LARGEST_DEG = 1e6  # even of a motor that tells counts
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,8 @@ class StepResponse:
             raise InputError(f"{self.name}: time, motor and eye need one length, got shapes {sorted(shapes)}")
         if not all(np.isfinite(a).all() for a in (self.time, self.motor_deg, self.eye_deg)):
             raise InputError(f"{self.name}: time, motor and eye must be finite numbers; remove rows that are not")
+        if max(np.abs(a).max(initial=0) for a in (self.motor_deg, self.eye_deg)) > _LARGEST_DEG:
+            raise InputError(f"{self.name}: nothing turns by more than {_LARGEST_DEG:g} deg; motor and eye are in deg")
         if not (np.diff(self.time) > 0).all():
             raise InputError(f"{self.name}: time must rise from row to row; sort the rows and remove repeated ones")
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orient_eye.checks import real
 from orient_eye.commands import Command
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.commands.pulses import PULSES, keeps_speed_limit, varying_C
@@ -33,6 +34,8 @@ B_RANGE = (18.0, 80.0)
 """Bounds of B in the action [1/s]."""
 K0_RANGE = (5.0, 40.0)
 """Bounds of k0 in the action [1/s]."""
+C_BOUNDS, SPEED_BOUNDS = (1.0, 1e5), (1.0, 1e5)
+"""Of an onset rate [1/s] and of a motor's speed limit [deg/s] that somebody names."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,9 @@ class Number:
         log: spread evenly on a logarithmic scale.
         fine: share of the range around a good value in which a search looks closer.
         cliff: whether the reward may have a cliff along it, so that a search stays on all sides.
+
+    Raises:
+        InputError: bounds that are none.
     """
 
     symbol: str
@@ -58,6 +64,14 @@ class Number:
     log: bool = False
     fine: float = 0.03
     cliff: bool = False
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite([self.low, self.high]).all() and (0 if self.log else -np.inf) < self.low < self.high):
+            positive = ", above 0 on a logarithmic scale" if self.log else ""
+            raise InputError(
+                f"{self.symbol} of an action goes from a number up to a larger one{positive}, got {self.low} to "
+                f"{self.high}"
+            )
 
 
 class ActionSpace(ABC):
@@ -168,19 +182,15 @@ class PulseStepActions(ActionSpace):
     ) -> None:
         self.plant, self.driven, self.pulse = plant, tuple(driven), pulse
         self.index = check_driven(plant.motors, self.driven, plant.name)
-        if speed_limit is None:
-            known = (plant.motors[i].speed_limit for i in self.index)
-            speed_limit = min((limit for limit in known if limit), default=SPEED_LIMIT)
-        self.speed_limit = speed_limit
+        known = (plant.motors[i].speed_limit for i in self.index)
+        self.speed_limit = min((limit for limit in known if limit), default=SPEED_LIMIT)
+        if speed_limit is not None:
+            self.speed_limit = real("the speed limit", speed_limit, *SPEED_BOUNDS, unit="deg/s")
         onset = PULSES[pulse].onset
-        if isinstance(C, str) and C != "varying":
-            raise InputError(f"C is a number [1/s], 'varying' or nothing, got {C!r}")
         if onset is None and C is not None:
             raise InputError(f"pulse {pulse!r} has no onset rate C; leave C = {C} out")
-        if isinstance(C, (int, float)) and not 0 < C < np.inf:
-            raise InputError(f"C must be positive and finite, got {C}")
-        if not 0 < speed_limit < np.inf:
-            raise InputError(f"the speed limit must be positive and finite, got {speed_limit}")
+        if C is not None and C != "varying":
+            C = real("the onset rate C", C, *C_BOUNDS, unit="1/s", advice="or 'varying'")
         self.C = onset.fixed if onset and C is None else C
         self.rates = PulseRates(**{k: (v[0], v[1]) for k, v in rates.items()}) if isinstance(rates, Mapping) else rates
         log = self.rates is not None or plant.pulse_rates is not None

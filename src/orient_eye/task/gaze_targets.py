@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye import listing, rotations
+from orient_eye.checks import real
 from orient_eye.errors import InputError
 from orient_eye.motor import check_driven, names
 from orient_eye.movement.measures import View
 from orient_eye.plants import Plant, PulseRates
 from orient_eye.plants.fixation import Fixations
 from orient_eye.state import State, unit
+from orient_eye.task.targets import HORIZON_S, LEAST_DEG, checked_count
 
 Array = NDArray[np.float64]
 LIMIT_DEG = 30.0
@@ -29,8 +31,6 @@ TORSION_DEG = 0.6
 """Starts have up to so much torsion more or less than that of the least force, as a saccade may have ended."""
 RATES = PulseRates((12.0, 120.0), (2.0, 60.0))
 """Hold the best pulse-steps in all directions: the eye is slower up and down than to the sides."""
-HORIZON_S = 0.7
-"""A saccade up or down takes longer than one to the side."""
 _AROUND = 32  # directions at the edge of the cone, at which it is looked what the motors can hold
 _LESS = 0.8  # times the torsion, until they can
 
@@ -72,10 +72,8 @@ class GazeTargets:
         torsion_deg: float = TORSION_DEG,
         driven: tuple[str, ...] | None = None,
     ) -> None:
-        if not 0 < limit_deg < 90:
-            raise InputError(f"the cone of gaze targets lies within 90 deg of straight ahead, got {limit_deg} deg")
-        if not 0 <= torsion_deg < 90:
-            raise InputError(f"torsion of starts lies between 0 and 90 deg, got {torsion_deg}")
+        limit_deg = real("the cone of gaze targets", limit_deg, LEAST_DEG, 89.0, unit="deg from straight ahead")
+        torsion_deg = real("torsion of starts", torsion_deg, 0.0, 89.0, unit="deg")
         self.plant, self.name = plant, name
         self.driven = names(plant.motors) if driven is None else driven
         if len(check_driven(plant.motors, self.driven, plant.name)) < len(plant.motors):
@@ -108,7 +106,7 @@ class GazeTargets:
 
     def draw(self, count: int, random: np.random.Generator) -> tuple[State, Array]:
         """See `orient_eye.task.targets.Targets`."""
-        away, around, torsion = random.uniform(size=(3, 2, count))
+        away, around, torsion = random.uniform(size=(3, 2, checked_count(count)))
         start, target = (
             _directions(self.limit_deg * np.sqrt(a), 2 * np.pi * b) for a, b in zip(away, around, strict=True)
         )

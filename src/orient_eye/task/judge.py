@@ -147,7 +147,7 @@ def _force(movement: Movement, measures: Measures, target: Array) -> Array:
     0 where no elastics are known. The plain S would draw large saccades short (`orient_eye.plants.fixation`).
     """
     excess = movement.excess_force()
-    return np.zeros(len(target)) if excess is None else -np.nan_to_num(np.maximum(excess, 0.0))
+    return np.zeros(len(target)) if excess is None else -np.nan_to_num(np.maximum(excess, 0.0), posinf=0.0)
 
 
 _COMMON = (Term("energy", _energy), Term("duration", _duration, -1.0), Term("overshoot", _overshoot, -10.0))

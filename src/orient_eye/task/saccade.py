@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.checks import real
 from orient_eye.commands import Command
-from orient_eye.constants import BAND, HORIZON_S
+from orient_eye.constants import BAND, HORIZON_S, LONGEST_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures
@@ -32,6 +33,8 @@ from orient_eye.task.known_weights import with_known_weights
 from orient_eye.task.targets import Targets, make_targets, restore_targets
 
 Array = NDArray[np.float64]
+LEAST_BAND = 1e-4
+"""Share of the amplitude: into a narrower band a saccade settles by what its simulation rounds."""
 
 
 @dataclass(frozen=True)
@@ -92,10 +95,8 @@ class SaccadeTask:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", JUDGES[self.judge].weights(self.weights))
-        if not 0 < self.horizon_s < np.inf:
-            raise InputError(f"the horizon must be positive and finite, got {self.horizon_s} s")
-        if not 0 < self.band < 1:
-            raise InputError(f"the settling band is a share of the amplitude between 0 and 1, got {self.band}")
+        real("the horizon", self.horizon_s, STEP_S, LONGEST_S, unit="s", advice="a saccade is over in 0.5 s")
+        real("the settling band", self.band, LEAST_BAND, 1 - LEAST_BAND, advice="it is a share of the amplitude")
 
     def _force_known(self) -> "SaccadeTask":
         """Itself, if nothing is to be judged of which the plant knows nothing."""

@@ -9,12 +9,13 @@ their k0, and D - F in proportion, are moved together. Tables and what they depe
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.checks import real
 from orient_eye.errors import InputError
 from orient_eye.state import State
 
@@ -25,8 +26,10 @@ Array = NDArray[np.float64]
 _THESIS_PLANT = {"plant": "lpf", "K": 1.4758, "w0": 17.5, "motor": "motor2"}
 _THESIS_D = 20.33  # deg, as printed; 30 deg / K = 20.328
 _SYMBOLS = ("B", "D", "k0")
+_RATES = (0.01, 1e4)  # 1/s, of B and k0 that somebody chooses
+_STEPS = (1e-4, 5.0)  # half-widths of differences: less sees rounding, more another saccade
 _SHOWS = 1e-6  # share of the amplitude
-_LARGEST_DEG = 30.0
+_LARGEST_DEG, _LEAST_DEG = 30.0, 0.01  # of the chosen saccade
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,9 @@ class ChosenSaccade:
             saccade on its own low-pass plant is 20.33 deg as printed.
         k0: [1/s]; None for the value below which this saccade overshoots: the pole that k0 cancels on a linear plant
             with one (the thesis' 17.5), and found by bisection on another plant.
+
+    Raises:
+        InputError: numbers that are none.
     """
 
     start: tuple[float, ...] | None = None
@@ -48,6 +54,14 @@ class ChosenSaccade:
     B: float = 35.0
     D: tuple[float, ...] | None = None
     k0: float | None = None
+
+    def __post_init__(self) -> None:
+        for symbol, rate in (("B", self.B), ("k0", self.k0)):
+            if rate is not None:
+                real(f"{symbol} of the chosen saccade", rate, *_RATES, unit="1/s")
+        for angles in (self.start, self.target, self.D):
+            for angle in angles or ():
+                real("an angle of the chosen saccade", angle, -180.0, 180.0, unit="deg")
 
 
 @dataclass(frozen=True)
@@ -88,8 +102,8 @@ class Steps:
     """1/s"""
 
     def __post_init__(self) -> None:
-        if not all(np.isfinite(step) and step > 0 for step in astuple(self)):
-            raise InputError(f"steps of the differences must be positive, got B {self.B}, D {self.D}, k0 {self.k0}")
+        for symbol, step in asdict(self).items():
+            real(f"the step of the difference in {symbol}", step, *_STEPS)
 
 
 def solve_weights(
@@ -110,6 +124,9 @@ def solve_weights(
 
 def solve_at(task: SaccadeTask, saccade: Resolved, steps: Steps) -> dict[str, float]:
     """The weights for which a resolved saccade is optimal; see `solve_weights`."""
+    for symbol, step in (("B", steps.B), ("k0", steps.k0)):
+        value = getattr(saccade.chosen, symbol)
+        real(f"the step of the difference in {symbol}", step, high=0.9 * value, advice=f"{symbol} is {value:g} 1/s")
     width = _widths(task, saccade, steps)
     moved = np.concatenate([saccade.action + width, saccade.action - width])
     which = np.zeros(len(moved), int)
@@ -158,16 +175,11 @@ def resolve(task: SaccadeTask, chosen: ChosenSaccade) -> Resolved:
     end = chosen.target
     if end is None:
         end = (min(_LARGEST_DEG, task.targets.limit_deg), *[0.0] * (count - 1))
-    numbers = [*begin, *end, chosen.B, *(chosen.D or ()), chosen.k0 or 0.0]
-    if not np.isfinite(numbers).all():
-        raise InputError(f"the chosen saccade must be finite numbers, got {chosen}")
-    if not (chosen.B > 0 and (chosen.k0 is None or chosen.k0 > 0)):
-        raise InputError(f"B and k0 of the chosen saccade are positive, got B = {chosen.B:g}, k0 = {chosen.k0}")
-    if max(map(abs, (*begin, *end))) >= 180:
-        raise InputError(f"angles lie between -180 and 180 deg, got {begin} and {end}")
-    if tuple(begin) == tuple(end):
-        raise InputError(f"the chosen saccade begins and ends at {begin} deg; choose another target")
     targets = task.targets
+    for what, angles in (("start", begin), ("target", end)):
+        targets.check(np.array([angles], float), what)
+    if np.abs(np.subtract(begin, end)).max() < _LEAST_DEG:
+        raise InputError(f"the chosen saccade begins at {begin} and ends at {end} deg; choose another target")
     start, target = targets.rest(targets.orientation([begin])), targets.orientation([end])
     D = chosen.D
     if D is None:
@@ -176,6 +188,9 @@ def resolve(task: SaccadeTask, chosen: ChosenSaccade) -> Resolved:
         D = (_THESIS_D,) if printed else tuple(at[[s == "D" for s in symbols]].tolist())
     if len(D) != symbols.count("D"):
         raise InputError(f"D is one number for each of the {symbols.count('D')} driven motors, got {D}")
+    if chosen.D is not None:
+        for number, value in zip((n for n in task.actions.numbers if n.symbol == "D"), D, strict=True):
+            real(f"D of {number.motor}", value, number.low, number.high, unit=number.unit)
     chosen = replace(chosen, start=tuple(begin), target=tuple(end), D=D)
     k0 = _onset_of_overshoot(task, chosen, start, target) if chosen.k0 is None else chosen.k0
     chosen = replace(chosen, k0=k0)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye import rotations
+from orient_eye.checks import real, whole
 from orient_eye.constants import YAW_LIMIT_DEG
 from orient_eye.errors import InputError
 from orient_eye.motor import check_driven, names
@@ -25,6 +26,10 @@ from orient_eye.state import State, unit
 from orient_eye.task.target_sets import TARGETS
 
 Array = NDArray[np.float64]
+LEAST_DEG, MOST = 1e-3, 1_000_000
+"""Of a range, a cone, and what a degree of motor turns; saccades drawn at once."""
+HORIZON_S = 0.7
+"""A saccade up or down takes longer than one to the side."""
 
 
 class Targets(Protocol):
@@ -54,7 +59,11 @@ class Targets(Protocol):
     learning: Mapping[str, Any]
 
     def draw(self, count: int, random: np.random.Generator) -> tuple[State, Array]:
-        """Starts, which the plant can hold, and target orientations (count, 4)."""
+        """Starts, which the plant can hold, and target orientations (count, 4).
+
+        Raises:
+            InputError: a count that is none, see `checked_count`.
+        """
         ...
 
     def orientation(self, angles: ArrayLike) -> Array:
@@ -110,9 +119,17 @@ def saccades(targets: Targets, start: ArrayLike, target: ArrayLike) -> tuple[Sta
     return targets.rest(targets.orientation(angles[0])), targets.orientation(angles[1])
 
 
+def checked_count(count: int) -> int:
+    """How many saccades are drawn, if a computer can make so many at once.
+
+    Raises:
+        InputError: it cannot, or that is no number of saccades.
+    """
+    return whole("the number of saccades", count, 0, MOST, advice=f"{MOST} take 8 GB once they are simulated")
+
+
 _NAMES = {"yaw": "horizontal", "pitch": "vertical", "roll": "torsional"}
 _AXES = {axis: place for place, axis in enumerate(_NAMES)}  # among the angles of `rotations.to_euler`
-_LEAST_DEG = 1e-3  # about the axis, a degree of motor
 _PURE = 0.05  # of what a motor turns about the axis, it may turn about the others
 _REACH = 0.98  # of what the plant can hold
 
@@ -135,7 +152,6 @@ class AxisTargets:
     of: View = "orientation"
     actions = "pulse-step"
     pulse_rates = None
-    horizon_s = None
     learning: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(
@@ -153,11 +169,11 @@ class AxisTargets:
         self.driven = _turning(plant, axis) if driven is None else driven
         if not self.driven:
             raise InputError(f"no motor of plant {plant.name!r} turns the eye in {axis}; choose other targets")
-        if not 0 < limit_deg < 180:
-            raise InputError(f"the range of {self.name} targets lies between 0 and 180 deg, got {limit_deg}")
+        limit_deg = real(f"the range of {self.name} targets", limit_deg, LEAST_DEG, 179.0, unit="deg")
+        self.horizon_s = None if axis != "pitch" or plant.horizon_s is None else max(plant.horizon_s, HORIZON_S)
         self.low, self.high = _held(plant, self.driven, axis)
         self.limit_deg = float(min(limit_deg, _REACH * min(-self.low, self.high)))
-        if not self.limit_deg > _LEAST_DEG:
+        if not self.limit_deg > LEAST_DEG:
             raise InputError(
                 f"motors {', '.join(self.driven)} of plant {plant.name!r} hold the eye between {self.low:.2f} and "
                 f"{self.high:.2f} deg of {axis}, not around straight ahead; choose other targets or motors"
@@ -169,6 +185,7 @@ class AxisTargets:
 
     def draw(self, count: int, random: np.random.Generator) -> tuple[State, Array]:
         """See `Targets`."""
+        count = checked_count(count)
         start, target = random.uniform(-self.limit_deg, self.limit_deg, (2, count, 1))
         return self.rest(self.orientation(start)), self.orientation(target)
 
@@ -222,8 +239,8 @@ def _turning(plant: Plant, axis: str) -> tuple[str, ...]:
     turned = np.abs(_effect(plant))
     about = turned[:, _AXES[axis]]
     others = np.delete(turned, _AXES[axis], axis=1).max(axis=1)
-    pure = (about > _LEAST_DEG) & (others < _PURE * about)
-    chosen = pure if pure.any() else about > np.maximum(_LEAST_DEG, _PURE * others)
+    pure = (about > LEAST_DEG) & (others < _PURE * about)
+    chosen = pure if pure.any() else about > np.maximum(LEAST_DEG, _PURE * others)
     return tuple(name for name, is_chosen in zip(names(plant.motors), chosen, strict=True) if is_chosen)
 
 
