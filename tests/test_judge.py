@@ -29,7 +29,7 @@ from orient_eye.state import State
 from orient_eye.surrogate import Surrogate
 from orient_eye.task.actions import B_RANGE, K0_RANGE
 from orient_eye.task.cases import Case
-from orient_eye.task.judge import JUDGES, Reward
+from orient_eye.task.judge import JUDGES, Reward, plain_reward
 from orient_eye.task.saccade import SaccadeTask
 from orient_eye.task.targets import saccades
 
@@ -53,10 +53,12 @@ def measures(count: int, **fields: Array | float) -> Measures:
     return Measures(**values)
 
 
-def reward(measured: Measures, energy: Array, target: Array, judge: str = "orientation") -> Reward:
-    """Of a movement that spent this energy."""
-    # All that a judge asks of it beside its measures; its elastics are not known.
-    movement: Any = SimpleNamespace(energy=lambda: energy, excess_force=lambda: None)
+def reward(
+    measured: Measures, energy: Array, target: Array, judge: str = "orientation", force: Array | None = None
+) -> Reward:
+    """Of a movement that spent this energy, and ends with this excess of force, if it is known."""
+    # All that a judge asks of it beside its measures.
+    movement: Any = SimpleNamespace(energy=lambda: energy, excess_force=lambda: force)
     return JUDGES[judge].reward(movement, measured, target, {**WEIGHTS, "force": 1.0})
 
 
@@ -105,14 +107,15 @@ def test_no_term_is_positive_and_the_best_is_zero() -> None:
     np.testing.assert_allclose(worst, -1, rtol=1e-11)
 
 
-def test_failed_saccades_get_the_worst_of_each_term() -> None:
+@pytest.mark.parametrize("judge", ["orientation", "gaze"])
+def test_failed_saccades_get_the_worst_of_each_term(judge: str) -> None:
     broken: dict[str, Any] = {"failed": np.array([False, True])}
     for name in ("settling_time_s", "overshoot", "skewness", "amplitude_deg", "peak_velocity_deg_s"):
         broken[name] = np.array([0.1, np.nan])
     for name in ("final", "at_settling"):
         broken[name] = np.array([[1.0, 0, 0, 0], [np.nan] * 4])
     for energy in (np.nan, np.inf, 3e5):
-        found = reward(measures(2, **broken), np.array([3e5, energy]), np.tile(FORWARD, (2, 1)))
+        found = reward(measures(2, **broken), np.array([3e5, energy]), np.tile(FORWARD, (2, 1)), judge)
         assert (found.terms["accuracy"][1], found.terms["duration"][1], found.terms["overshoot"][1]) == (-1, -1, -10)
         for value in (*found.terms.values(), found.total):
             assert np.isfinite(value).all()
@@ -134,6 +137,20 @@ def test_the_other_judge_looks_at_the_gaze() -> None:
     assert reward(measures(1, at_settling=twisted), np.zeros(1), aim).terms["accuracy"][0] < -0.06
 
 
+def test_an_excess_of_force_costs_as_much() -> None:
+    """One below 0 is rounding; a saccade that failed has none, and where no elastics are known nobody has."""
+    target = np.tile(FORWARD, (5, 1))
+    found = reward(measures(5), np.zeros(5), target, "gaze", np.array([0.25, 3.0, -1e-9, np.nan, np.inf]))
+    assert found.terms["force"].tolist() == found.total.tolist() == [-0.25, -3.0, 0.0, 0.0, 0.0]
+    assert reward(measures(5), np.zeros(5), target, "gaze").terms["force"].tolist() == [0.0] * 5
+
+
+def test_columns_of_a_reward_add_up() -> None:
+    found = Reward({"speed": np.array([-1.0, -2.0]), "grace": np.array([-0.5, 0.0])}, np.array([-7.0, -12.0]))
+    columns = {name: column.tolist() for name, column in plain_reward(found, {"speed": 6.0, "grace": 2.0}).items()}
+    assert columns == {"reward": [-7, -12], "reward_speed": [-6, -12], "reward_grace": [-1, 0]}
+
+
 @pytest.mark.parametrize("name", ["accuracy", "energy", "duration", "overshoot"])
 @pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf")])
 def test_bad_weights_are_refused(name: str, value: float) -> None:
@@ -149,6 +166,13 @@ def test_weights_are_those_of_the_terms() -> None:
             JUDGE.weights(wrong)
     with pytest.raises(InputError, match="not all 0"):
         JUDGE.weights([0, 0, 0, 0])
+
+
+def test_a_judge_is_found_by_what_it_looks_at_and_needs_no_force() -> None:
+    """`JUDGES[targets.of]`, with weights for a task whose weights do not matter, on any plant."""
+    for judge in JUDGES.values():
+        assert JUDGES[judge.of] is judge
+        assert judge.weights(judge.any_weights).get("force", 0.0) == 0
 
 
 # --- the task: from command to reward -------------------------------------------------------------
@@ -230,17 +254,17 @@ def test_motors_that_are_not_driven_are_told_to_stay() -> None:
     ("case", "options", "message"),
     [
         ("1", {"driven": ("motor9",)}, r"'lpf' has the motors motor2; cannot drive \['motor9'\]"),
-        (Case("2", "variable"), {}, "'varying' or nothing, got 'variable'"),
-        (Case("2", -1.0), {}, "positive and finite, got -1"),
+        (Case("2", "variable"), {}, "onset rate C must be a number .* got 'variable'; or 'varying'"),
+        (Case("2", -1.0), {}, "onset rate C must be a number .* got -1"),
         (Case("1", 3.0), {}, "has no onset rate C"),
         (Case("9"), {}, "unknown pulse '9'"),
         ("9", {}, "unknown case '9'"),
         ("1", {"targets": "sideways"}, "unknown target 'sideways'"),
         ("1", {"judge": "mother"}, "unknown judge 'mother'"),
-        ("1", {"band": 0.0}, "between 0 and 1, got 0"),
-        ("1", {"band": 1.0}, "between 0 and 1, got 1"),
-        ("2-varying", {"speed_limit": 0.0}, "speed limit must be positive"),
-        ("1", {"horizon_s": -1.0}, "horizon must be positive"),
+        ("1", {"band": 0.0}, "band must be a number .* got 0; it is a share"),
+        ("1", {"band": 1.0}, "band must be a number .* got 1; it is a share"),
+        ("2-varying", {"speed_limit": 0.0}, "speed limit must be a number .* deg/s, got 0"),
+        ("1", {"horizon_s": -1.0}, "horizon must be a number .* s, got -1"),
     ],
 )
 def test_bad_tasks_are_refused(case: str | Case, options: dict[str, Any], message: str) -> None:
@@ -437,7 +461,7 @@ def test_a_search_counts_and_tells_what_it_does() -> None:
     assert shares == sorted(shares)
     assert (shares[0] > 0, shares[-1]) == (True, 1)
     for effort in (0, -1.0, np.nan, np.inf):
-        with pytest.raises(InputError, match="number above 0"):
+        with pytest.raises(InputError, match=r"effort of a search must be a number from 0.01 to 1000"):
             find_optimum(TASK, start, target, np.random.default_rng(0), effort=effort)
 
 

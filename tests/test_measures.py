@@ -16,11 +16,12 @@ from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.commands.pulses import PULSES, varying_C
 from orient_eye.constants import BAND
 from orient_eye.motor import Motor
-from orient_eye.movement.measures import Measures, measure
+from orient_eye.movement.measures import Measures, View, measure, measure_angle, merged
+from orient_eye.movement.tail import Tail
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import PLANTS, Plant, make_plant
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.rotations import FORWARD, angle_between, from_yaw, gaze, rotation, to_euler
+from orient_eye.rotations import AXES, FORWARD, about, angle_between, from_euler, from_yaw, gaze, rotation, to_euler
 from orient_eye.state import State
 from orient_eye.surrogate import Surrogate
 
@@ -238,6 +239,9 @@ def test_settling_of_samples_is_interpolated() -> None:
     found = measure(by_yaw(time, yaw))
     assert found.settling_time_s[0] == pytest.approx(0.0993, abs=1e-12)
     np.testing.assert_allclose(to_euler(found.at_settling)[0], 9.9, atol=1e-9)
+    sign = (-1.0) ** np.arange(201)[None, :, None]  # -q is the same orientation as q
+    flipped = measure(replace(by_yaw(time, yaw), orientation=sign * from_yaw(yaw)))
+    np.testing.assert_allclose(to_euler(flipped.at_settling)[0], 9.9, atol=1e-9)
     assert measure(by_yaw(time, yaw), band=0.25).settling_time_s[0] == pytest.approx(0.0753, abs=1e-12)
 
 
@@ -275,9 +279,9 @@ def test_not_settled_within_the_horizon() -> None:
     assert not short.failed.any()
 
 
-def test_no_movement_from_samples() -> None:
-    still = by_yaw(0.001 * np.arange(50), np.full((1, 50), 7.0), np.zeros((1, 50)))
-    found = measure(still)
+@pytest.mark.parametrize("samples", [1, 2, 50])
+def test_no_movement_from_samples(samples: int) -> None:
+    found = measure(by_yaw(0.001 * np.arange(samples), np.full((1, samples), 7.0), np.zeros((1, samples))))
     assert found.amplitude_deg == found.settling_time_s == found.peak_velocity_deg_s == found.overshoot == 0
     assert np.isnan(found.skewness).all()
     assert found.settled.all()
@@ -285,13 +289,51 @@ def test_no_movement_from_samples() -> None:
     np.testing.assert_allclose(found.at_settling, from_yaw([7.0]), atol=1e-15)
 
 
+@pytest.mark.parametrize("of", ["orientation", "gaze"])
+@pytest.mark.parametrize(
+    ("yaw", "velocity", "settling", "top", "at"),
+    [
+        ([0.0, 10.0], [300.0, 200.0], 0.99, 300.0, 0.0),
+        ([0.0, 10.0], [200.0, 300.0], 0.99, 300.0, 1.0),
+        ([0.0, 4.0, 10.0], [300.0, 200.0, 0.0], 1 + 5.9 / 6, 300.0, 0.0),
+        ([0.0, 4.0, 10.0], [100.0, 300.0, 200.0], 1 + 5.9 / 6, 3650 / 12, 7 / 6),
+        ([0.0, 1.0, 4.0, 10.0], [100.0, 300.0, 200.0, 0.0], 2 + 5.9 / 6, 3650 / 12, 7 / 6),
+        ([0.0, 4.0, 10.0], [np.nextafter(1, 0), 1.0, 1.0], 1 + 5.9 / 6, 1.0, 1.0),
+    ],
+)
+def test_few_samples(yaw: list[float], velocity: list[float], settling: float, top: float, at: float, of: View) -> None:
+    """A centisecond apart: two; the parabola 100 + 350 t - 150 t^2, with t in samples, through three; a plateau."""
+    found = measure(by_yaw(0.01 * np.arange(len(yaw)), np.array([yaw]), np.array([velocity])), of=of)
+    np.testing.assert_allclose(found.settling_time_s, 0.01 * settling, rtol=1e-5)
+    np.testing.assert_allclose(found.peak_velocity_deg_s, top, rtol=1e-12)
+    np.testing.assert_allclose(found.skewness, max(settling - at, 0) / settling, rtol=1e-5)
+    np.testing.assert_allclose(to_euler(found.at_settling)[0], 9.9, rtol=5e-5)
+    assert found.settled.all()
+    assert (found.overshoot == 0).all()
+
+
 def equal(one: Measures, other: Measures) -> None:
     for name in vars(one):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
-def rows_of(found: Measures, rows: list[int]) -> Measures:
-    return Measures(**{name: value[rows] for name, value in vars(found).items()})
+def some_of(count: int) -> Measures:
+    """Of saccades, each number another."""
+    fields: dict[str, Any] = {name: np.arange(count) + 100.0 * k for k, name in enumerate(SCALARS)}
+    for k, name in enumerate(("final", "at_settling")):
+        fields[name] = 1000.0 * (k + 1) + np.arange(4.0 * count).reshape(count, 4)
+    return Measures(**fields, settled=np.arange(count) % 2 == 0, failed=np.arange(count) % 3 == 0)
+
+
+def test_measures_of_some_saccades_and_of_all_again() -> None:
+    found, which = some_of(5), np.array([True, False, False, True, True])
+    chosen = found[which]
+    assert chosen.overshoot.tolist() == [300, 303, 304]
+    assert chosen.at_settling[:, 0].tolist() == [2000, 2012, 2016]
+    assert chosen.failed.tolist() == [True, True, False]
+    again = merged(which, chosen, found[~which])
+    equal(again, found)
+    assert again.settled.dtype == bool
 
 
 def test_failed_saccades_are_nan_and_stay_alone() -> None:
@@ -306,7 +348,7 @@ def test_failed_saccades_are_nan_and_stay_alone() -> None:
         for name in (*SCALARS, "final", "at_settling"):
             assert np.isnan(getattr(found, name)[2]).all(), name
         keep = [0, 1, 3]
-        equal(rows_of(found, keep), measure(trajectory[np.array(keep)], final[keep]))
+        equal(found[np.array(keep)], measure(trajectory[np.array(keep)], final[keep]))
 
 
 def test_a_final_orientation_that_is_none_fails_alone() -> None:
@@ -315,7 +357,7 @@ def test_a_final_orientation_that_is_none_fails_alone() -> None:
     final[1] = np.nan
     found = measure(trajectory, final)
     assert found.failed.tolist() == [False, True, False]
-    equal(rows_of(found, [0, 2]), measure(trajectory[np.array([0, 2])], final[[0, 2]]))
+    equal(found[np.array([0, 2])], measure(trajectory[np.array([0, 2])], final[[0, 2]]))
 
 
 def test_closed_form_of_a_command_that_is_none_fails_alone() -> None:
@@ -325,12 +367,76 @@ def test_closed_form_of_a_command_that_is_none_fails_alone() -> None:
     assert found.failed.tolist() == [False, True, False]
     for name in SCALARS:
         assert np.isnan(getattr(found, name)[1]).all(), name
-    equal(rows_of(found, [0, 2]), PLANT.move(good).measure())
+    equal(found[np.array([0, 2])], PLANT.move(good).measure())
 
 
 def test_without_a_final_orientation_the_last_sample_counts() -> None:
     trajectory = in_time(random_pulse_steps("1", 3, seed=8), 901)
     equal(measure(trajectory), measure(trajectory, trajectory.orientation[:, -1]))
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_an_angle_measures_like_its_orientation(axis: str) -> None:
+    """Of saccades that settle and do not, large and small, one that failed, one without a way, and its last sample."""
+    steps = np.array([20.0, -20.0, 0.3, 15.0, 40.0, -9.0, 12.0])
+    command = pulse_step(np.full(7, 35.0), steps, np.array([17.5, 12.0, 13.0, 20.0, 6.0, 5.0, 40.0]))
+    time = 0.001 * np.arange(301)
+    angle, rate = yaw_of(respond(command), time[None]) + 3.0, respond(command).rate(time[None])
+    final = K * command.D[:, 0] + 3.0
+    angle[3], rate[3], final[3] = 7.0, 0.0, 7.0
+    angle[6, -1] = final[6]  # only then it is there
+    failed = np.arange(7) == 5
+    angle[5], final[5] = np.nan, np.nan
+    found = measure_angle(time, angle, rate, final, axis, failed)
+    omega = rate[..., None] * np.eye(3)[AXES[axis]]
+    motor = angle[..., None]
+    turned = Trajectory(time, about(axis, angle), omega, motor, motor, None, failed, (Motor("motor2"),))
+    expected = measure(turned, about(axis, final))
+    assert expected.settled.tolist() == [True, True, True, True, False, False, True]
+    assert (expected.overshoot > 0.01).tolist() == [False, True, True, False, True, False, False]
+    assert expected.settling_time_s[6] > 0.299
+    for name in ("settled", "failed"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+    for name in SCALARS:
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-8, atol=1e-10, err_msg=name)
+    for name in ("final", "at_settling"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-8, err_msg=name)
+
+
+# --- with a tail ----------------------------------------------------------------------------------
+
+
+def with_tail(yaw: Array, end: Array, rate: float, final: Array) -> Measures:
+    """Over 0.1 s, then an exponential to its end, about yaw."""
+    time = np.linspace(0, 0.1, yaw.shape[1])
+    way = np.deg2rad(np.stack([0 * end, 0 * end, yaw[:, -1] - end], axis=-1))
+    tail = Tail(way, from_yaw(end), np.full(len(yaw), rate), np.zeros(len(yaw)))
+    return measure(by_yaw(time, yaw), from_yaw(final), tail=tail)
+
+
+@pytest.mark.parametrize(("share", "r"), [(-1.0, 30.0), (0.2, 10.0), (-1.0, 0.5)])
+def test_a_tail_says_when_the_eye_settles(share: float, r: float) -> None:
+    """way (1 + share exp(-r t)), short of the end or beyond it: in the band of 1 % at ln(100 |share|) / r."""
+    way, decay = np.array([20.0, -20.0, 0.5]), np.exp(-r * np.linspace(0, 0.1, 101))
+    yaw = 5 + way[:, None] * (1 + share * decay)
+    yaw[:, 0] = 5.0
+    found = with_tail(yaw, 5 + way, r, 5 + way)
+    np.testing.assert_allclose(found.settling_time_s, np.log(100 * abs(share)) / r, rtol=1e-9)
+    np.testing.assert_allclose(to_euler(found.at_settling)[0], 5 + (1 + 0.01 * np.sign(share)) * way, atol=1e-9)
+    assert not found.settled.any()
+    stays = with_tail(yaw, 5 + way, 0.0, 5 + way)  # it does not approach its end
+    np.testing.assert_array_equal(stays.settling_time_s, 0.1)
+    np.testing.assert_allclose(to_euler(stays.at_settling)[0], yaw[:, -1], atol=1e-9)
+
+
+def test_where_a_tail_leads_is_no_overshoot() -> None:
+    """An eye on its way to an end a twentieth beside where it is said to rest; what goes beyond that is one."""
+    t = np.linspace(0, 1, 101)
+    for crest, overshoot in ((10.3, 0.0), (10.8, 0.08)):
+        way = np.array([1.0, -1.0, 0.05])  # also of half a degree
+        yaw = way[:, None] * crest * (1 - (1 - 2 * np.minimum(t, 0.55)) ** 2)
+        found = with_tail(yaw, 10.5 * way, 40.0, 10 * way)
+        np.testing.assert_allclose(found.overshoot, overshoot, rtol=1e-9)
 
 
 # --- in three dimensions --------------------------------------------------------------------------
@@ -498,3 +604,19 @@ def test_amplitude_of_gaze_is_the_angle_between_the_lines_of_sight() -> None:
     apart = np.rad2deg(np.arccos((start * end).sum(axis=1)))
     np.testing.assert_allclose(measure(trajectory, final, of="gaze").amplitude_deg, apart, rtol=1e-9)
     assert (measure(trajectory, final).amplitude_deg > apart - 1e-9).all()
+
+
+def test_a_turn_about_the_line_of_sight_is_no_movement_of_the_gaze() -> None:
+    """Of 12 deg, as fast as it may be, looking anywhere."""
+    time = 0.001 * np.arange(201)
+    torsion = 12 * np.sin(np.pi / 2 * np.minimum(time / 0.1, 1)) ** 2
+    for yaw, pitch in ((0.0, 0.0), (20.0, -15.0)):
+        q = from_euler(yaw, pitch, torsion)[None]
+        omega = np.gradient(torsion, time)[:, None] * gaze(q[0])
+        trajectory = replace(by_yaw(time, 0 * torsion[None]), orientation=q, angular_velocity=omega[None])
+        still, turned = measure(trajectory, of="gaze"), measure(trajectory)
+        for name in SCALARS[:4]:
+            np.testing.assert_allclose(getattr(still, name), 0, atol=1e-5, err_msg=name)
+        assert still.settled.all()
+        np.testing.assert_allclose(turned.amplitude_deg, 12, rtol=1e-12)
+        np.testing.assert_allclose(turned.peak_velocity_deg_s, 60 * np.pi, rtol=1e-3)

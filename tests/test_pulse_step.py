@@ -288,6 +288,26 @@ def test_batch_shapes_and_motors(name: str) -> None:
     assert not command.too_fast.any()
 
 
+def test_a_command_of_plain_numbers() -> None:
+    """Lists and numbers, whole ones too, become arrays (saccades, motors)."""
+    command = PulseStep([[0, 5]], [[35, 40]], [[20], [-3]], 17, "2", 85)
+    expected = {"F": [0, 5], "B": [35, 40], "D": [[20], [-3]], "k0": 17, "C": 85}
+    for name, value in expected.items():
+        array = getattr(command, name)
+        np.testing.assert_array_equal(array, np.broadcast_to(np.array(value, float), (2, 2)), strict=True, err_msg=name)
+    np.testing.assert_array_equal(command.step, [[20, 15], [-3, -8]])
+
+
+def test_some_saccades_of_a_command() -> None:
+    rng = np.random.default_rng(0)
+    parts = {name: rng.uniform(20, 80, (4, 3)) for name in ("F", "B", "D", "k0", "C")}
+    too_fast, which = np.array([True, False, True, False]), np.array([2, 1])
+    some = PulseStep(pulse="3", too_fast=too_fast, **parts)[which]
+    assert (len(some), some.pulse, some.too_fast.tolist()) == (2, "3", [True, False])
+    for name, array in parts.items():
+        np.testing.assert_array_equal(getattr(some, name), array[which], err_msg=name)
+
+
 @pytest.mark.parametrize("name", VARYING)
 @properties
 @given(step=st.floats(0.02, 160), B=st.floats(18, 80), k0=gain, V=st.sampled_from([720.0, 7200.0]))
@@ -382,6 +402,8 @@ def test_the_thesis_pulses_start_at_nothing(variant: str, C: float) -> None:
         ({"k0": [[-1.0, 17.5]]}, "k0 must be positive, got -1"),
         ({"pulse": "2", "C": -3.0}, "C must be positive, got -3"),
         ({"F": 0.0, "D": 20.0, "B": 35.0, "k0": 17.5}, r"\(saccades, motors\), got \(\)"),
+        ({"D": [[1.0, 2.0, 3.0]]}, r"\(saccades, motors\), got \(1, 2\), \(1, 2\), \(1, 3\), \(1, 2\), \(\)"),
+        ({"D": [["left", "right"]]}, "^D .*number"),
     ],
 )
 def test_bad_commands_are_refused(change: dict[str, Any], message: str) -> None:
