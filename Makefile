@@ -3,22 +3,32 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
+LOWEST := .venv-lowest
+EXTRAS := .[dev,onnx,physical,tensorboard]
 DEMO ?= demo
+PYTEST := -m pytest -n auto
+# A file's tests share what they prepare; files with slow tests begin first (tests/conftest.py).
+BY_FILE := --dist loadfile --no-loadscope-reorder
+FUZZ_EXAMPLES ?= 5000
+FAULTS ?= 20
 COVERAGE ?= --cov --cov-report=term:skip-covered
 
-.PHONY: help demo test check rigs bench clean
+.PHONY: help demo test check fuzz faults lowest rigs bench clean
 
 help:
 	@echo "make demo   install, identify the eye, train a saccade policy (minutes), picture and recording in $(DEMO)/"
 	@echo "make test   install and run all tests, with coverage of lines and branches; make test COVERAGE= is faster"
 	@echo "make check  ruff and the type checker"
+	@echo "make fuzz   $(FUZZ_EXAMPLES) inputs for each reader and public function, and a table of what held; FUZZ_EXAMPLES=..."
+	@echo "make faults $(FAULTS) kills and full disks of each kind for every command, and a table of what held; FAULTS=..."
+	@echo "make lowest fast tests with the lowest versions that pyproject.toml allows, in $(LOWEST) (downloads 4 GB)"
 	@echo "make rigs   thirty simulated rigs, from their recorded steps to a command that they perform (an hour)"
 	@echo "make bench  speed of the plants and of the learning, start-up, and how cost grows (ten minutes)"
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt torch==2.13.0
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,onnx,physical,tensorboard]"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable "$(EXTRAS)"
 	@touch $(INSTALLED)
 
 demo: $(INSTALLED)
@@ -32,12 +42,27 @@ demo: $(INSTALLED)
 	@echo "  $(BIN)/orient-eye view $(DEMO)/train/recording.rrd    the saccades in 3-D, at several stages of training"
 
 test: $(INSTALLED)
-	$(BIN)/python -m pytest -n auto $(COVERAGE)
+	$(BIN)/python $(PYTEST) $(BY_FILE) $(COVERAGE)
 
 check: $(INSTALLED)
 	$(BIN)/ruff check src tests scripts benchmarks examples
 	$(BIN)/ruff format --check src tests scripts benchmarks examples
 	$(BIN)/mypy
+
+fuzz: $(INSTALLED)
+	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python $(PYTEST) tests/test_fuzz_*.py
+
+faults: $(INSTALLED)
+	FAULTS=$(FAULTS) $(BIN)/python $(PYTEST) tests/test_faults_*.py tests/test_checkpoint.py
+
+$(LOWEST)/.installed: pyproject.toml
+	$(PYTHON) -m venv --clear $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet uv
+	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable "$(EXTRAS)"
+	@touch $@
+
+lowest: $(LOWEST)/.installed
+	$(LOWEST)/bin/python $(PYTEST) $(BY_FILE) -m "not slow"
 
 rigs: $(INSTALLED)
 	RIGS=10 $(BIN)/python -m pytest -n 2 -rP tests/test_rigs.py
@@ -50,4 +75,4 @@ bench: $(INSTALLED)
 	$(BIN)/python benchmarks/growth.py
 
 clean:
-	rm -rf $(VENV) $(DEMO) .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(LOWEST) $(DEMO) .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -100,6 +100,7 @@ def test_the_search_is_about_the_whole_box_and_told_plainly() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("short_second_search")
 @pytest.mark.parametrize("plant", ["modal", "tavares"])
 def test_two_independent_searches_agree(plant: str) -> None:
     task = task_of(plant)

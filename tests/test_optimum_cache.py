@@ -318,6 +318,7 @@ def test_two_searches_agree_on_the_simulated_eye() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("short_second_search")
 def test_two_searches_agree_in_nine_dimensions() -> None:
     """All three motors driven; only motor2 turns the eye much, so that the optimum is flat in five numbers."""
     own = SaccadeTask.of_case(TavaresPlant(), "1", driven=("motor1", "motor2", "motor3"), weights=WEIGHTS)

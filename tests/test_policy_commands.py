@@ -18,7 +18,7 @@ from orient_eye.cli.predict import Predict
 from orient_eye.cli.saccades import Saccades
 from orient_eye.commands.motor_file import read_command
 from orient_eye.errors import InputError
-from orient_eye.learning import figures
+from orient_eye.learning import figures, judged
 from orient_eye.learning.evaluation import Yardstick, carry_optimum, evaluation_saccades
 from orient_eye.learning.policy import NAME, Policy, shipped_policies
 from orient_eye.motor import names
@@ -66,6 +66,13 @@ def mujoco_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evaluations that draw and record nothing: what they leave is looked at elsewhere."""
+    monkeypatch.setattr(judged, "draw_policy_figures", lambda *_: [])
+    monkeypatch.setattr(judged, "record_policy", lambda *_: None)
 
 
 # --- predict --------------------------------------------------------------------------------------------
@@ -248,7 +255,7 @@ def test_evaluate_holds_a_policy_against_the_optimum(folder: Path, tmp_path: Pat
         Evaluate(str(folder), pairs=3, out=tmp_path / "run", quiet=True).run()
 
 
-@pytest.mark.usefixtures("cache")
+@pytest.mark.usefixtures("cache", "no_pictures")
 def test_the_optimum_travels_with_a_policy(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Copied or not, with all of its saccades or some of them; on another plant it is searched."""
     own = shutil.copytree(folder, tmp_path / "policy")
@@ -278,7 +285,7 @@ def test_the_optimum_travels_with_a_policy(folder: Path, tmp_path: Path, monkeyp
     assert len(searched) == 2
 
 
-@pytest.mark.usefixtures("cache")
+@pytest.mark.usefixtures("cache", "no_pictures")
 def test_evaluate_takes_as_many_saccades_as_the_training(folder: Path, tmp_path: Path) -> None:
     policy = Policy.load(folder)
     replace(policy, manifest={**policy.manifest, "result": {"pairs": 3}}).save(tmp_path / "policy")

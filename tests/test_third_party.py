@@ -5,14 +5,29 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 PAGE = Path(__file__).parents[1] / "CONTRIBUTING.md"
-Run = Callable[..., tuple[Any, str]]
+Give = Callable[..., str]
+Run = Callable[..., Any]
+
+PROGRAM = """
+import contextlib, io, json, sys
+from orient_eye.cli import main
+
+for line in sys.stdin:
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        try:
+            main(json.loads(line))
+        except SystemExit as end:
+            code = end.code
+    print(json.dumps([code, out.getvalue(), error.getvalue()]), flush=True)
+"""
 
 
 def blocks() -> dict[str, str]:
@@ -32,17 +47,29 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(site), "XDG_CACHE_HOME": str(tmp_path_factory.mktemp("cache"))}
 
 
-@pytest.fixture
-def run(environment: dict[str, str], tmp_path: Path) -> Run:
-    def command(*arguments: str) -> tuple[Any, str]:
-        done = subprocess.run(
-            [sys.executable, "-m", "orient_eye", *arguments, "--json"],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout), done.stderr
+@pytest.fixture(scope="module")
+def give(environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Give]:
+    """Gives command lines, one after another, to a process that has the package installed; returns what it prints."""
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM], cwd=tmp_path_factory.mktemp("work"), env=environment, text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.stdin
+        assert process.stdout
 
-    return command
+        def given(*arguments: str) -> str:
+            print(json.dumps(arguments), file=process.stdin, flush=True)
+            code, out, error = json.loads(process.stdout.readline())
+            assert not code, error
+            return out
+
+        yield given
+
+
+@pytest.fixture
+def run(give: Give) -> Run:
+    """A command's result."""
+    return lambda *arguments: json.loads(give(*arguments, "--json"))
 
 
 def test_the_page_shows_the_whole_package() -> None:
@@ -50,10 +77,8 @@ def test_the_page_shows_the_whole_package() -> None:
 
 
 @pytest.mark.parametrize("command", ["simulate", "sysid", "weights", "optimum", "train", "predict", "evaluate"])
-def test_help_lists_it(command: str, environment: dict[str, str]) -> None:
-    arguments = [sys.executable, "-m", "orient_eye", command, "--help"]
-    done = subprocess.run(arguments, env=environment, capture_output=True, text=True, timeout=60, check=True)
-    text = " ".join(done.stdout.split())
+def test_help_lists_it(command: str, give: Give) -> None:
+    text = give(command, "--help")
     if command not in ("predict", "evaluate"):
         assert "spring" in text
     assert "--stiffness" in text
@@ -62,25 +87,26 @@ def test_help_lists_it(command: str, environment: dict[str, str]) -> None:
 
 
 def test_simulate_and_sysid(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "command.csv").write_text("t_s,servo_deg\n0,0\n0.02,20\n0.5,10\n")
-    result, _ = run("simulate", "--plant", "spring", "--motor", "command.csv", "--horizon", "1")
+    command = tmp_path / "command.csv"
+    command.write_text("t_s,servo_deg\n0,0\n0.02,20\n0.5,10\n")
+    result = run("simulate", "--plant", "spring", "--motor", str(command), "--horizon", "1")
     assert result["final_yaw_pitch_roll_deg"] == pytest.approx([10, 0, 0], abs=1e-3)
     # Two real poles, 19.1 and 130.9 1/s: the first-order fit comes near the slow one.
-    result, _ = run("sysid", "--plant", "spring", "--amplitudes", "5", "10", "20", "--out", "sysid")
+    result = run("sysid", "--plant", "spring", "--amplitudes", "5", "10", "20", "--out", "sysid")
     assert result["K"] == pytest.approx(1, abs=0.01)
     assert 14 < result["w0"] < 20
     assert result["models"]["second_order"]["wn"] == pytest.approx(50, rel=0.1)  # steps of 1 ms shift it
 
 
 def test_weights_and_optimum(run: Run) -> None:
-    result, _ = run("weights", "--plant", "spring", "--case", "square")
+    result = run("weights", "--plant", "spring", "--case", "square")
     (row,) = result["cases"]
     assert all(row[name] > 0 for name in ("accuracy", "duration", "overshoot"))
-    result, _ = run("optimum", "--plant", "spring", "--case", "square", "--start", "0", "--target", "20", "--check")
+    result = run("optimum", "--plant", "spring", "--case", "square", "--start", "0", "--target", "20", "--check")
     assert result["passed"]
     assert result["saccades"][0]["final_yaw_deg"] == pytest.approx(20, abs=0.6)
     # Stiffer, so another plant, with weights and optimum of its own.
-    other, _ = run(
+    other = run(
         "optimum", "--plant", "spring", "--stiffness", "3500", "--case", "square", "--start", "0", "--target", "20"
     )
     assert not other["remembered"]
@@ -90,13 +116,13 @@ def test_weights_and_optimum(run: Run) -> None:
 def test_train_predict_evaluate(run: Run) -> None:
     few = ("--updates", "30", "--saccades-per-update", "8", "--batch-size", "64", "--warmup", "64")
     run("train", "--plant", "spring", "--case", "square", "--out", "run", "--evaluation-pairs", "2", *few)
-    result, _ = run("predict", "run", "--target", "20", "--command", "saccade.csv")
+    result = run("predict", "run", "--target", "20", "--command", "saccade.csv")
     assert result["plant"]["plant"] == "spring"
     assert not result["differs_from_training"]
-    simulated, _ = run("simulate", "--plant", "spring", "--motor", "saccade.csv", "--horizon", "1.5")
+    simulated = run("simulate", "--plant", "spring", "--motor", "saccade.csv", "--horizon", "1.5")
     expected = result["saccades"][0]["final_yaw_deg"]
     assert simulated["final_yaw_pitch_roll_deg"][0] == pytest.approx(expected, abs=0.05)
-    result, _ = run("evaluate", "run", "--pairs", "2")
+    result = run("evaluate", "run", "--pairs", "2")
     assert result["pairs"] == 2
     # Nothing of the plant is lost on the way through the policy's file.
     assert result["task"]["plant"] == {"plant": "spring", "stiffness": 2500.0, "damping": 150.0}

@@ -1,15 +1,28 @@
-"""What is built carries what the checkout has at its top: the MJCF, meshes and shipped models."""
+"""What is built holds all that it needs and nothing else, and runs where no checkout, cache or home is.
 
+The wheel is built from the unpacked source distribution, so both are tried. It is installed by pip into an environment
+of its own, beside the libraries of this one.
+"""
+
+import ast
 import os
+import re
+import shutil
 import subprocess
 import sys
+import sysconfig
 import tarfile
+import tomllib
 import zipfile
+from dataclasses import dataclass
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ("src", "eye_mjcf", "models", "tests", "scripts", "benchmarks", "examples", "docs", ".ci")
+PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", *(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")))
 
 SHIPPED = {
     "eye_mjcf/eye3.xml",
@@ -26,10 +39,40 @@ SHIPPED = {
     "models/author_simulator/trajectories.npz",
 }
 
+RUBBISH = (
+    ".coverage.host.1",
+    ".hypothesis/examples/1",
+    ".mypy_cache/x.json",
+    ".venv-lowest/pyvenv.cfg",
+    "MUJOCO_LOG.TXT",
+    "demo/train/run.json",
+    "dist/orient_eye-0.0.0.tar.gz",
+    "notes.txt",
+    "old/docs/page.md",
+    "runs/train-1/checkpoint.pt",
+    "src/orient_eye/__pycache__/constants.cpython-39.pyc",
+    "src/orient_eye.egg-info/PKG-INFO",
+    "tests/.pytest_cache/README.md",
+)
+"""What lies about in a checkout that somebody works in."""
+
+COMMANDS = """
+models
+simulate --motor command.csv --out simulated
+sysid --plant lpf --amplitudes 5 10 --held-out 7 --out identified
+train --surrogate identified/surrogate.json --updates 8 --warmup 64 --batch-size 16 --evaluation-pairs 3 --out trained
+predict trained --target 10 --command saccade.csv
+evaluate lpf-1 --pairs 3 --out evaluated
+export mujoco-1 --onnx policy.onnx --sb3 policy.zip
+view --help
+validate --random-runs 1
+"""
+
 PROGRAM = """
 import sys
 from pathlib import Path
 import orient_eye as oe
+from orient_eye.cli import main
 from orient_eye.eyes.model import ball
 from orient_eye.resources import data_folder
 from orient_eye.rig import Rig
@@ -48,58 +91,149 @@ policies = sorted(folder.name for folder in data_folder("models").glob("policies
 assert len(policies) > 1
 for name in policies:
     oe.Policy.load(name)
-print("all of it")
+for line in sys.stdin.read().split("\\n"):
+    try:
+        main(line.split())
+    except SystemExit as end:
+        assert not end.code, (line, end.code)
 """
 
 
-def build(kind: str, folder: Path) -> Path:
-    command = [sys.executable, "-m", "build", f"--{kind}", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+@dataclass(frozen=True)
+class Built:
+    """The unpacked source distribution, and the wheel built from it."""
+
+    source: Path
+    wheel: Path
+
+
+def build(kind: str, source: Path, folder: Path) -> Path:
+    command = [sys.executable, "-m", "build", f"--{kind}", "--no-isolation", "--outdir", str(folder), str(source)]
     subprocess.run(command, check=True, capture_output=True)
     (built,) = folder.glob("orient_eye-*")
     return built
 
 
-def files(folder: str) -> set[str]:
-    """Of a folder of the checkout, without what Python leaves there."""
-    found = (path for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts)
-    return {path.relative_to(ROOT).as_posix() for path in found}
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    folder = tmp_path_factory.mktemp("build")
+    checkout = folder / "checkout"
+    for name in FOLDERS:
+        shutil.copytree(ROOT / name, checkout / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for path in ROOT.iterdir():
+        if path.is_file():
+            shutil.copy(path, checkout)
+    for name in RUBBISH:
+        (checkout / name).parent.mkdir(parents=True, exist_ok=True)
+        (checkout / name).write_text("rubbish")
+    with tarfile.open(build("sdist", checkout, folder / "sdist")) as archive:
+        archive.extractall(folder / "unpacked", filter="data")
+    (source,) = (folder / "unpacked").iterdir()
+    return Built(source, build("wheel", source, folder / "wheel"))
+
+
+def files(folder: Path) -> set[str]:
+    """Of a folder of the checkout or of the source distribution, without what Python leaves there."""
+    found = (path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    return {path.relative_to(folder).as_posix() for path in found}
+
+
+def packaged(root: Path) -> set[str]:
+    """What travels inside the package, by its path from the top."""
+    return {f"{folder}/{file}" for folder in ("eye_mjcf", "models") for file in files(root / folder)}
 
 
 def test_the_checkout_has_what_is_shipped() -> None:
-    assert files("eye_mjcf") | files("models") >= SHIPPED
+    assert packaged(ROOT) >= SHIPPED
 
 
-def test_wheel_runs_without_the_checkout(tmp_path: Path) -> None:
-    with zipfile.ZipFile(build("wheel", tmp_path / "dist")) as archive:
+def test_source_distribution_is_the_checkout(built: Built) -> None:
+    wanted = {f"{folder}/{file}" for folder in FOLDERS for file in files(ROOT / folder)}
+    assert wanted
+    assert wanted <= files(built.source)
+    assert {name.split("/")[0] for name in files(built.source)} == {
+        *FOLDERS,
+        *(".gitignore", ".pre-commit-config.yaml", "Makefile", "pyproject.toml", "constraints.txt", "PKG-INFO"),
+        *("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", "LICENSE"),
+    }
+
+
+def test_source_distribution_holds_no_rubbish(built: Built) -> None:
+    assert files(built.source).isdisjoint(RUBBISH)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_source_distribution_holds_what_a_page_names(page: str, built: Built) -> None:
+    text = (built.source / page).read_text()
+    tops = "|".join(map(re.escape, [*FOLDERS, "Makefile", "CONTRIBUTING.md", "CHANGELOG.md", "constraints.txt"]))
+    named = set(re.findall(rf"(?<![\w./-])(?:{tops})(?:/[\w./*-]*\w)?(?![\w/])", text))
+    linked = {
+        os.path.relpath((built.source / page).parent / link, built.source)
+        for link in re.findall(r"\]\(([^)#:]+)\)", text)
+    }
+    assert named | linked
+    assert [path for path in sorted(named | linked) if not any(built.source.glob(path))] == []
+
+
+def test_wheel_holds_the_package_alone(built: Built) -> None:
+    with zipfile.ZipFile(built.wheel) as archive:
         names = archive.namelist()
-        archive.extractall(tmp_path / "site")
     assert len(names) == len(set(names))
-    assert {f"orient_eye/_data/{file}" for file in files("eye_mjcf") | files("models") | SHIPPED} <= set(names)
-    assert "orient_eye/py.typed" in names
+    assert {f"orient_eye/_data/{file}" for file in packaged(ROOT)} <= set(names)
+    assert {f"orient_eye/{file}" for file in files(ROOT / "src" / "orient_eye")} <= set(names)
     tops = {name.split("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"orient_eye"}
 
-    (tmp_path / "command.csv").write_text("t_s,tau2_deg\n0,0\n0.1,8\n0.4,8\n")
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
-    for arguments in (
-        ["-m", "orient_eye", "simulate", "--motor", "command.csv", "--out", "run"],
-        ["-m", "orient_eye", "models"],
-        ["-c", PROGRAM, str(tmp_path / "site")],
-    ):
+
+@pytest.mark.slow
+def test_commands_run_without_checkout_home_and_cache(built: Built, tmp_path: Path) -> None:
+    """And nothing is written but where it was said and into the cache; the package may be read alone."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv"], check=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    site = Path(sysconfig.get_path("purelib", vars={"base": str(tmp_path / "venv")}))
+    install = ["install", "--quiet", "--no-deps", "--no-index", str(built.wheel)]
+    subprocess.run([sys.executable, "-m", "pip", "--python", python, *install], check=True)
+    # Path files in a folder that is named by a path file are not read, so the checkout stays hidden.
+    (site / "libraries.pth").write_text(sysconfig.get_path("purelib"))
+    for path in (site / "orient_eye").rglob("*"):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    package = files(site / "orient_eye")
+
+    home, work = tmp_path / "home", tmp_path / "work"
+    home.mkdir()
+    work.mkdir()
+    (work / "command.csv").write_text("t_s,tau2_deg\n0,0\n0.1,8\n0.4,8\n")
+
+    def run(*arguments: str | Path) -> str:
+        environment = {"HOME": str(home), "PATH": os.environ["PATH"]}
         done = subprocess.run(
-            [sys.executable, *arguments], check=False, capture_output=True, text=True, cwd=tmp_path, env=environment
+            arguments, check=False, capture_output=True, text=True, cwd=work, env=environment, input=COMMANDS.strip()
         )
         assert done.returncode == 0, done.stderr
-    assert done.stdout == "all of it\n"
+        return done.stdout
+
+    assert run(python.with_name("orient-eye"), "--version").strip() in built.wheel.name
+    run(python, "-c", PROGRAM, site)
+    assert files(site / "orient_eye") == package
+    assert {path.relative_to(home).as_posix() for path in home.glob("*/*")} == {".cache/orient-eye"}
+    assert [path.name for path in home.iterdir()] == [".cache"]
+    assert {path.name for path in work.iterdir()} == {
+        *("command.csv", "simulated", "identified", "trained", "saccade.csv", "evaluated", "policy.onnx", "policy.zip")
+    }
 
 
-@pytest.mark.parametrize("folder", ["src", "eye_mjcf", "models", "tests", "scripts", "benchmarks", "examples", "docs"])
-def test_source_distribution_is_the_checkout(folder: str, source: set[str]) -> None:
-    assert files(folder)
-    assert files(folder) <= source
-
-
-@pytest.fixture(scope="module")
-def source(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
-    with tarfile.open(build("sdist", tmp_path_factory.mktemp("sdist"))) as archive:
-        return {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
+def test_every_library_that_is_imported_is_named() -> None:
+    """None comes only because another library needs it."""
+    imported = set()
+    for file in (ROOT / "src").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                imported |= {name.name.split(".")[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                imported.add(node.module.split(".")[0])
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    required = [*project["dependencies"], *project["optional-dependencies"]["onnx"]]
+    named = {re.split(r"[^\w-]", requirement)[0].lower() for requirement in required}
+    homes = packages_distributions()
+    for module in imported - sys.stdlib_module_names - {"orient_eye"}:
+        assert named & {home.lower().replace("_", "-") for home in homes[module]}, module
