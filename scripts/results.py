@@ -27,6 +27,7 @@ import tyro
 from orient_eye.files import write_text
 from orient_eye.learning.evaluation import carry_optimum, evaluation_saccades
 from orient_eye.learning.policy import Policy, shipped_policies
+from orient_eye.report.evidence import COURSE
 from orient_eye.search.optimum_file import NAME
 from orient_eye.task.cases import CASES
 
@@ -174,7 +175,8 @@ def ship(folder: Path) -> None:
             continue
         policy = Policy.load(best)
         goal = policy.save(ROOT / "models" / "policies" / f"{plant}-{case}").parent
-        shutil.copy(best / NAME, goal / NAME)
+        for name in (NAME, COURSE):
+            shutil.copy(best / name, goal / name)
         carry(goal)
         print(f"models/policies/{plant}-{case}: from {best.name}", file=sys.stderr)
 

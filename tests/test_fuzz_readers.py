@@ -388,14 +388,15 @@ ELSEWHERE = {
     "learning.training": "run.json; tests/test_training.py",
     "learning.checkpoint": "tests/test_checkpoint.py",
     "files": "the readers below all others",
+    "report.evidence": "shipped studies, and metrics.csv by read_table",
 }
 """Modules that read files, and where else they are tried."""
 OF_OURS = {
     "files.py": "the readers themselves",
     "cli/view.py": "the first bytes of a recording; tests/test_viewer.py",
     "validation.py": "shipped data",
-    "figures/gaze/human.py": "shipped data",
-    "learning/figures/main_sequence.py": "shipped data",
+    "human.py": "shipped data",
+    "report/page.py": "the template of the page",
     "learning/figures/page.py": "the metrics of a run, while it is made",
 }
 """Who opens a file by himself, and why."""

@@ -28,7 +28,7 @@ from orient_eye.task.saccade import SaccadeTask
 Array = NDArray[np.float64]
 PNG = b"\x89PNG"
 PICTURES = (
-    "gaze_paths", "components", "main_sequence", "listing_plane", "torsion", "motors", "reward_gap", "figure_5_24"
+    "gaze_paths", "components", "main_sequence", "listing_plane", "torsion", "motors", "reward_gap", "reward_against_k0"
 )  # fmt: skip
 
 
@@ -157,7 +157,7 @@ def test_the_page_of_a_training_run(task: SaccadeTask, saccades: tuple[Yardstick
     assert "mean 11.11 %" in gap.get_title()
     ways = [line.get_label() for line in components.lines if "deg" in str(line.get_label())]
     assert ways == ["8.7 left, 5.0 up [deg]", "10.0 left, 17.3 up [deg]"]
-    assert any(str(label).startswith("human") for label in peak.get_legend_handles_labels()[1])
+    assert any(str(label).startswith("people") for label in peak.get_legend_handles_labels()[1])
     assert {"Listing", "Fick"} < set(plane.get_legend_handles_labels()[1])
     assert paths.get_aspect() == 1
     assert figures.draw_policy(usual(task), pairs, tmp_path / "policy.png").read_bytes()[:4] == PNG

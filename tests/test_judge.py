@@ -171,7 +171,7 @@ def test_weights_are_those_of_the_terms() -> None:
 def test_a_judge_is_found_by_what_it_looks_at_and_needs_no_force() -> None:
     """`JUDGES[targets.of]`, with weights for a task whose weights do not matter, on any plant."""
     for judge in JUDGES.values():
-        assert JUDGES[judge.of] is judge
+        assert (JUDGES[judge.of].of, JUDGES[judge.of].names) == (judge.of, judge.names)
         assert judge.weights(judge.any_weights).get("force", 0.0) == 0
 
 

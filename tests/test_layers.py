@@ -12,7 +12,7 @@ FLOORS = [
     ["errors", "checks", "constants", "words", "registry", "resources"],
     ["files", "tables", "rotations", "listing", "motor", "state", "progress", "run_directory", "rig"],
     ["commands"],
-    ["movement"],
+    ["movement", "human"],
     ["eyes", "surrogate", "modal_surrogate"],
     ["plants"],
     ["task", "statics"],
@@ -20,6 +20,7 @@ FLOORS = [
     ["recording"],
     ["environments"],
     ["sysid", "learning", "figures", "validation"],
+    ["report"],
     ["cli", "__main__"],
 ]
 """From the lowest up; a name is a module or a package of orient_eye. docs: CONTRIBUTING.md."""

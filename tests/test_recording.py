@@ -291,7 +291,7 @@ def test_failed_saccades_are_left_out_with_a_note(tmp_path: Path) -> None:
     drawn = entities(path)
     assert any(each.startswith("/saccades/2_c") for each in drawn)
     assert not any(each.startswith("/saccades/1_b") for each in drawn)
-    assert "| b |  |  | **failed" in column(path, "/info", "TextDocument:text")[1][0][0]
+    assert "| b |  | **failed" in column(path, "/info", "TextDocument:text")[1][0][0]
     alone = record(tmp_path / "alone.rrd", trajectory[1])
     verify(alone)
     assert "failed" in column(alone, "/info", "TextDocument:text")[1][0][0]

@@ -35,6 +35,7 @@ COMMANDS = {
     "optimum": "orient_eye.cli.optimum:Optimum",
     "listing": "orient_eye.cli.listing:Listing",
     "weights": "orient_eye.cli.weights:Weights",
+    "report": "orient_eye.cli.report:Report",
     "validate": "orient_eye.cli.validate:Validate",
 }
 """Name to "module:class", in the order of the help page."""

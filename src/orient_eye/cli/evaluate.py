@@ -90,6 +90,6 @@ class Evaluate:
             for angle in (name.removesuffix("_deg") for name in task.targets.angles):
                 mean, most = (result[f"{angle}_error_{of}_deg"] for of in ("mean", "max"))
                 say(f"final {angle} off by {mean:.3f} deg in the mean, {most:.3f} deg at most")
-        say(f"in {run.path}: result.json, pairs.csv, {', '.join(drawn) if gaze else 'figure_5_*.png'}, recording.rrd")
+        say(f"in {run.path}: result.json, pairs.csv, {', '.join(drawn)}, recording.rrd")
         say(f"look at the saccades: orient-eye view {run.path}/recording.rrd")
         return result

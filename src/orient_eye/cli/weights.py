@@ -1,6 +1,6 @@
 """orient-eye weights."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -32,6 +32,8 @@ class Weights:
     $ orient-eye weights --band 0.00707
 
     $ orient-eye weights --plant mujoco --case 1
+
+    $ orient-eye weights --human
     """
 
     problem: Problem = field(default_factory=Problem)
@@ -55,6 +57,14 @@ class Weights:
     step_k0: float = 0.05
     """Half-width of the central difference in k0, 1/s; lambda_o is about inversely proportional to it."""
 
+    human: bool = False
+    """Search the weights whose best saccades have the main sequence of people, over all pulses and two rates at which
+    time is discounted: the inverse problem."""
+    like: Annotated[tuple[float, ...] | None, _found("people's", "V0 C D0 D")] = None
+    """With --human: your own main sequence, V = V0 (1 - exp(-A/c)) [deg/s, deg] and D = D0 + d A [ms, ms/deg]."""
+    quiet: bool = False
+    """Show no progress bar."""
+
     def run(self) -> dict[str, Any]:
         """Solve and print the table."""
         from dataclasses import asdict
@@ -64,6 +74,8 @@ class Weights:
         from orient_eye.task.solved_weights import Steps
 
         plant, targets = self.problem.made()
+        if self.human or self.like is not None:
+            return self._nearest_to_people(plant, targets)
         terms = [name for name in JUDGES[targets.of].names if name != "energy"]
         steps = Steps(self.step_B, self.step_D, self.step_k0)
         rows = [self._solve(plant, targets, name, case, steps) for name, case in self._cases().items()]
@@ -83,6 +95,21 @@ class Weights:
             "steps": asdict(steps),
             "cases": rows,
         }
+
+    def _nearest_to_people(self, plant: "Plant", targets: "Targets") -> dict[str, Any]:
+        from orient_eye.cli.weights_human import nearest_to_people
+        from orient_eye.errors import InputError
+
+        if not self.human:
+            raise InputError("--like says which main sequence --human comes near to; give --human too")
+        own = {"human", "like", "quiet", "problem"}
+        said = [f.name for f in fields(self) if f.name not in own and getattr(self, f.name) != f.default]
+        said += [name for name in ("pulse", "C", "speed_limit") if getattr(self.problem, name) is not None]
+        if said:
+            raise InputError(
+                f"--human searches over pulses and weights itself; leave --{said[0].replace('_', '-')} out"
+            )
+        return nearest_to_people(plant, targets, self.like, self.problem.band, quiet=self.quiet)
 
     def _cases(self) -> "dict[str, str | Case]":
         """The cases that were asked for, by what to call them."""
@@ -109,6 +136,7 @@ class Weights:
         import numpy as np
 
         from orient_eye.errors import InputError
+        from orient_eye.task.cases import CASES
         from orient_eye.task.judge import JUDGES
         from orient_eye.task.known_weights import solve, with_known_weights
         from orient_eye.task.solved_weights import Steps, resolve, solve_at
@@ -125,7 +153,8 @@ class Weights:
             if chosen != usual or steps != Steps():
                 raise InputError(f"case {name}: {error}") from error
         if chosen == usual and steps == Steps():
-            kept = with_known_weights(task) if not weights else None
+            own = (CASES[case] if isinstance(case, str) else case).judge is not None  # and weights that go with it
+            kept = with_known_weights(task) if own or not weights else None
             known, where = solve(task) if kept is None else (dict(kept.weights), kept.weights_from)
             if known != weights:  # told by another saccade, which stands in the words
                 weights, how, action = known, where, np.full(len(action), np.nan)

@@ -70,20 +70,20 @@ def _of_gaze(policy: Policy, pairs: Yardstick, action: Array) -> dict[str, float
 
 
 def draw_policy_figures(policy: Policy, pairs: Yardstick, table: Yardstick, folder: Path) -> list[str]:
-    """The pictures that suit the task, named after the thesis' figures or after what they show; returns their names."""
+    """The pictures that suit the task, named after what they show; returns their names."""
     task = pairs.task
     pictures = (
         figures.gaze_pictures(policy, pairs)
         if in_all_directions(task)
         else {
-            "figure_5_1": figures.figure_5_1(policy, pairs, table),
-            "figure_5_2": figures.figure_5_2(policy, task),
-            "figure_5_3": figures.figure_5_3(policy, task),
-            "figure_5_4": figures.figure_5_4(policy, task),
-            "figure_5_25": figures.figure_5_25(policy, pairs),
+            "policy_output": figures.figure_5_1(policy, pairs, table),
+            "saccades": figures.figure_5_2(policy, task),
+            "pure_step": figures.figure_5_3(policy, task),
+            "main_sequence": figures.figure_5_4(policy, task),
+            "energy": figures.figure_5_25(policy, pairs),
         }
     )
-    pictures["figure_5_24"] = figures.figure_5_24(policy, table)
+    pictures["reward_against_k0"] = figures.figure_5_24(policy, table)
     return [save(figure, folder / f"{name}.png").name for name, figure in pictures.items()]
 
 

@@ -13,7 +13,7 @@ no code. The format of the file is in docs/policies.md.
 import json
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ NAME = "policy.safetensors"
 _FORMAT = "orient-eye policy 2"
 _OLD_NAME = "policy.json"  # of format 1
 _METADATA = "orient-eye"  # the one key: safetensors would write several in any order
-_ALIKE = 0.05  # of a bound
+_FITTED, _EDGE = 4096, 0.999  # saccades of a fit, and how near to the bounds of tanh it goes
 _LARGEST_BYTES = 64 * 2**20  # the thesis' networks have 0.1 MB
 
 
@@ -119,10 +119,42 @@ class Policy:
             target: desired orientations, (saccades, 4).
         """
         start, target = np.asarray(start, float), np.asarray(target, float)
+        x = self._hidden(start, target)
+        return scale(np.tanh(x @ self.weights[-1] + self.biases[-1]), self.low, self.high, self.log)
+
+    def _hidden(self, start: Array, target: Array) -> Array:
+        """What goes into the last layer, (saccades, its inputs)."""
         x = gaze_features(start, target) if self.inputs == GAZE_INPUTS else np.concatenate([start, target], axis=-1)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             x = np.maximum(x @ weight + bias, 0)
-        return scale(np.tanh(x @ self.weights[-1] + self.biases[-1]), self.low, self.high, self.log)
+        return x
+
+    def within(self, task: SaccadeTask, random: np.random.Generator) -> "Policy":
+        """The same policy with its actions told in the bounds of a task: itself, or with its last layer fitted anew.
+
+        The fit, by least squares over random saccades, is of what goes into the last tanh; actions beyond the bounds are
+        at them.
+
+        Args:
+            task: with the same numbers.
+            random: draws the saccades.
+        """
+        low, high, log = task.actions.low, task.actions.high, task.actions.log
+        if all(np.array_equal(*pair) for pair in ((self.low, low), (self.high, high), (self.log, log))):
+            return self
+        start, target = task.targets.draw(_FITTED, random)
+        inputs = np.column_stack([self._hidden(start.orientation, target), np.ones(_FITTED)])
+        action = np.clip(self.act(start.orientation, target), low, high)
+        wanted = np.arctanh(np.clip(task.actions.to_unit(action), -_EDGE, _EDGE))
+        *weight, bias = np.linalg.lstsq(inputs, wanted, rcond=None)[0]
+        return replace(
+            self,
+            weights=(*self.weights[:-1], np.array(weight)),
+            biases=(*self.biases[:-1], bias),
+            low=low,
+            high=high,
+            log=log,
+        )
 
     def torch_module(self) -> "TorchPolicy":
         """The same as a torch module: start and target (batch, 4) to actions in units (batch, numbers)."""
@@ -144,7 +176,7 @@ class Policy:
     def require_actions(self, task: SaccadeTask) -> None:
         """Refuse a task whose actions mean something else, so that this policy would not do there what it does here.
 
-        Bounds may differ by `_ALIKE`, as those of D do between an eye and its surrogate.
+        Bounds may differ, as those of D do between an eye and its surrogate (`within`).
 
         Raises:
             InputError: says what differs.
@@ -155,11 +187,6 @@ class Policy:
             for t in (self.task(), task)
         )
         words = [f"{key} {in_words(own[key])}, not {in_words(here[key])}" for key in own if own[key] != here[key]]
-        if not words and not all(
-            np.allclose(getattr(self, end), getattr(task.actions, end), rtol=_ALIKE) for end in ("low", "high")
-        ):
-            told = (f"{low:.4g} to {high:.4g}" for low, high in zip(self.low, self.high, strict=True))
-            words.append(f"bounds {', '.join(told)}, not those of this task")
         if self.inputs != GAZE_INPUTS:
             words.append("networks that see quaternions")
         if words:

@@ -168,7 +168,7 @@ def _origin(settings: TrainSettings, task: SaccadeTask) -> Policy | None:
         return None
     policy = Policy.load(settings.origin)
     policy.require_actions(task)
-    return policy
+    return policy.within(task, np.random.default_rng(settings.seed))
 
 
 def _check_interval(checkpoint_s: float) -> None:

@@ -129,9 +129,10 @@ def _write(path: Path, content: _Content, model: mujoco.MjModel) -> Path:
     scene = Scene(model, poses, drawn, graticule=curves.graticule)
     vectors = RotationVectors(trajectory.orientation[drawn]) if "torsion" in curves.turns else None
     plots, compared = curves.plots(), curves.compared()
+    lasts_s = float(trajectory.time[-1])
 
     def draw(rec: "rr.RecordingStream") -> None:
-        rec.send_blueprint(blueprint(shown, plots, compared, scene, vectors), make_active=False)
+        rec.send_blueprint(blueprint(shown, plots, compared, scene, vectors, lasts_s=lasts_s), make_active=False)
         draw_info(rec, _info(content, curves, scene, vectors))
         scene.draw_head(rec)
         if vectors:
@@ -173,8 +174,8 @@ def _info(content: _Content, curves: Curves, scene: Scene, vectors: RotationVect
         "",
         *scene.text,
         *(vectors.text if vectors else []),
-        f"| saccade | group | target {angles} | final {angles} | peak speed |",
-        "|---|---|---|---|---|",
+        f"| saccade | target {angles} | final {angles} | peak |",
+        "|---|---|---|---|",
     ]
     for tab in content.tabs:
         k = tab.index
@@ -183,5 +184,6 @@ def _info(content: _Content, curves: Curves, scene: Scene, vectors: RotationVect
         if not trajectory.failed[k]:
             peak = np.linalg.norm(trajectory.angular_velocity[k], axis=-1).max()
             ended = f"{naming.attitude(trajectory.orientation[k, -1], curves.turns, 2)} | {peak:.0f} °/s"
-        lines.append(f"| {tab.title} | {tab.group} | {aim} | {ended} |")
+        name = f"{tab.title}, {tab.group}" if tab.group else tab.title
+        lines.append(f"| {name} | {aim} | {ended} |")
     return "\n".join(lines)

@@ -1,5 +1,6 @@
 """The time series of a recording: which curves a saccade has, and the plots they stand in."""
 
+import colorsys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,7 @@ TENDON_COLOURS: tuple[Colour, ...] = (
 _TURNS = {"yaw": "z", "pitch": "y", "torsion": "x"}  # an angle and the axis of its velocity
 STILL_DEG = 0.5
 """Pitch and torsion that stay below are left out; torsion is shown, however small, where yaw and pitch both move."""
+_TURN = 0.37  # of the circle of hues, from one curve of a saccade to the next
 _SAME = 1e-6  # of a motor's unit: a command that its motor follows to this is not drawn
 
 
@@ -37,7 +39,7 @@ class Plot:
         series: entity paths below a saccade's root; those of the reference are added.
         span: smallest and largest value over all saccades, so that tabs compare.
         legend: how many curves of one saccade it has to tell apart; 0 where there is one.
-        shaded: the first curve is drawn in a shade of its saccade's colour, because of its place in a saccade's tab.
+        shaded: the first curve has another hue than its saccade's colour, because of its place in a saccade's tab.
     """
 
     name: str
@@ -143,10 +145,10 @@ class Curves:
         return plots
 
     def draw(self, rec: "rr.RecordingStream", root: str, saccade: int, *, title: str, colour: Colour) -> None:
-        """Send a saccade's curves: in its colour, or shades of it where a plot has several."""
+        """Send a saccade's curves: in its colour, the others of a plot in other hues."""
         place = {name: i for plot in self.plots() for i, name in enumerate(plot.series)}
         for path, values in self.own.items():
-            style = _style(f"{path.split('/')[1]} {title}", shade(colour, place.get(path, 0)), 2)
+            style = _style(f"{path.split('/')[1]} {title}", turned_hue(colour, place.get(path, 0)), 2)
             _send(rec, f"{root}/{path}", self._time, values[saccade], style)
         for path, values in self.told.items():
             style = _style(f"{path.replace('/', ' ')} {title}", TARGET_COLOUR, 1)
@@ -196,11 +198,11 @@ class Curves:
         return Plot(name, tuple(series), span, legend=len(series) if several else 0)
 
 
-def shade(colour: Colour, place: int) -> Colour:
-    """The colour of the first, second, third ... curve of a saccade in one plot."""
-    toward, share = ((0, 0.0), (255, 0.6), (0, 0.45), (255, 0.8), (0, 0.65))[place % 5]
-    r, g, b = (round((1 - share) * c + share * toward) for c in colour)
-    return r, g, b
+def turned_hue(colour: Colour, place: int) -> Colour:
+    """The colour of the first, second, third ... curve of a saccade in one plot: its hue turned around the circle."""
+    hue, saturation, value = colorsys.rgb_to_hsv(*(part / 255 for part in colour))
+    red, green, blue = (round(255 * part) for part in colorsys.hsv_to_rgb((hue + _TURN * place) % 1, saturation, value))
+    return red, green, blue
 
 
 def _command_of(motor: str) -> str:

@@ -1,7 +1,8 @@
 """How a recording of saccades is laid out in the Rerun viewer: tabs, plots, colours.
 
-The first tab compares all saccades, if there are several; then comes one tab a saccade, inside one a group. All stand
-on one timeline, so the time cursor stays where it is when another saccade is picked.
+The first tab compares all saccades, if there are several; then comes one tab a saccade. Of groups the first tab
+compares all, each in a plot of its own; then comes a tab a group, in which those tabs stand. All stand on one timeline,
+so the time cursor stays where it is when another saccade is picked.
 """
 
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ SACCADE_COLOURS = np.array(
     [[90, 140, 255], [50, 200, 220], [90, 210, 110], [235, 215, 70], [250, 150, 60], [240, 80, 90], [220, 100, 210]]
 )
 """Colours of saccades, by title; more than seven are mixed from them."""
+_BEYOND = 1.12  # of a saccade's duration: how far plots go, so that the last tick has room
 _SPEED, _SEQUENCE_SPEED = 0.1, 0.4  # of playing: a saccade lasts some tenths of a second
 
 
@@ -58,6 +60,8 @@ def blueprint(
     compared: Sequence[Plot],
     scene: Scene,
     vectors: RotationVectors | None = None,
+    *,
+    lasts_s: float,
 ) -> Any:
     """The viewer's layout.
 
@@ -67,8 +71,11 @@ def blueprint(
         compared: of the first tab, all saccades in each.
         scene: what is drawn in 3-D.
         vectors: what is drawn of rotation vectors, or None.
+        lasts_s: how long a saccade lasts [s].
     """
     import rerun.blueprint as rrb
+
+    until_s = _BEYOND * lasts_s
 
     def listing(shown: Sequence[SaccadeTab]) -> list[Any]:
         return [_vectors_view(vectors, [f"{s.root}/listing/**" for s in shown])] if vectors else []
@@ -77,37 +84,39 @@ def blueprint(
         return [_gaze_view(scene, [f"{s.root}/scene" for s in shown])] if scene.graticule.around_deg else []
 
     def tab(saccade: SaccadeTab) -> rrb.Horizontal:
-        beside = [_plot(p, [saccade]) for p in plots] + listing([saccade])
+        beside = [_plot(p, [saccade], until_s=until_s) for p in plots] + listing([saccade])
         eye = _eye_view(scene, "eye", [f"{saccade.root}/scene/**"])
         return rrb.Horizontal(
             rrb.Vertical(eye, *gaze([saccade])), rrb.Grid(*beside, grid_columns=2), name=saccade.title
         )
+
+    def together(shown: Sequence[SaccadeTab], *more: Any) -> rrb.Horizontal:
+        """A tab that compares saccades."""
+        lines = [line for s in shown for line in _lines(f"{s.root}/scene", scene.gaze)]
+        name = f"eye of {shown[0].title}, lines of sight of all"
+        fan = _eye_view(scene, name, [f"{shown[0].root}/scene/**", *lines])
+        beside = [_plot(p, shown, until_s=until_s) for p in compared]
+        if len(beside) < 4:
+            return rrb.Horizontal(fan, rrb.Grid(*beside, *more, grid_columns=2), name="all saccades")
+        views = [*gaze(shown), *listing(shown)] or more
+        grid = rrb.Grid(*beside, grid_columns=3)
+        return rrb.Horizontal(rrb.Vertical(fan, *views), grid, column_shares=[2, 3], name="all saccades")
 
     groups: dict[str, list[SaccadeTab]] = {}
     for saccade in saccades:
         groups.setdefault(saccade.group, []).append(saccade)
     info = rrb.TextDocumentView(origin="/info", name="info")
     tabs: list[Any] = []
-    if len(saccades) > 1:
-        lines = [line for s in saccades for line in _lines(f"{s.root}/scene", scene.gaze)]
-        name = f"eye of {saccades[0].title}, lines of sight of all"
-        fan = _eye_view(scene, name, [f"{saccades[0].root}/scene/**", *lines])
-        beside = [_plot(p, saccades) for p in compared]
-        if len(beside) < 4:
-            first = rrb.Horizontal(fan, rrb.Grid(*beside, info, grid_columns=2), name="all saccades")
-        else:
-            grid = rrb.Grid(*beside, grid_columns=3)
-            views = [*gaze(saccades), *listing(saccades)] or [info]
-            first = rrb.Horizontal(rrb.Vertical(fan, *views), grid, column_shares=[2, 3], name="all saccades")
-        tabs.append(first)
     if len(groups) > 1:
-        each = [_plot(compared[0], members, f"{group}: {compared[0].name}") for group, members in groups.items()]
-        tabs.append(rrb.Grid(*each, name="by group"))
-        tabs += [rrb.Tabs(*(tab(s) for s in members), name=group) for group, members in groups.items()]
+        name = compared[0].name
+        each = [_plot(compared[0], own, f"{group}: {name}", until_s=until_s) for group, own in groups.items()]
+        tabs += [rrb.Grid(*each, name="by group"), info]
+        tabs += [rrb.Tabs(together(own), *(tab(s) for s in own), name=group) for group, own in groups.items()]
     else:
+        tabs += [together(saccades, info)] if len(saccades) > 1 else []
         tabs += [tab(s) for s in saccades]
-    if len(saccades) < 2 or scene.graticule.around_deg:
-        tabs.append(info)
+        if len(saccades) < 2 or scene.graticule.around_deg:
+            tabs.append(info)
     return _whole(tabs, _SPEED)
 
 

@@ -18,11 +18,15 @@ class Case:
         C: onset rate [1/s], "varying" for the one that brings the motor to its speed limit, None for the pulse's
             fixed value or where it has none.
         summary: for people.
+        judge: a name of `orient_eye.task.judge.JUDGES`; None for that of the targets.
+        B: bounds of B [1/s], where the thesis' are too narrow; None for the plant's own.
     """
 
     pulse: str
     C: float | str | None = None
     summary: str = ""
+    judge: str | None = None
+    B: tuple[float, float] | None = None
 
 
 CASES: Registry[Case] = Registry(
@@ -33,6 +37,7 @@ CASES: Registry[Case] = Registry(
         "2-varying": Case("2", "varying", "thesis 5.2.2"),
         "3-fixed": Case("3", None, "thesis 5.3.1"),
         "3-varying": Case("3", "varying", "thesis 5.3.2"),
+        "human": Case("3", None, "people's main sequence (docs/human.md)", "impatient", (18.0, 300.0)),
     },
     Case,
 )

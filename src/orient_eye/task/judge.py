@@ -11,6 +11,7 @@ Every term is at most 0; the weights say how much each matters. A judge has any 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,10 @@ from orient_eye.registry import Registry
 Array = NDArray[np.float64]
 DISCOUNT = 0.6
 """Temporal discount rate [1/s] of the duration term (4.39)."""
+IMPATIENT_DISCOUNT = 10.0
+"""Of a judge for whom the first hundredth of a second counts more than the next: with the thesis' rate a saccade's time
+costs in proportion, and then the best peak velocity grows with the root of the amplitude, whatever the weights; that
+of people levels off (`orient_eye.search.human_like`)."""
 
 
 @dataclass(frozen=True)
@@ -131,9 +136,9 @@ def _energy(movement: Movement, measures: Measures, target: Array) -> Array:
     return -np.nan_to_num(movement.energy(), nan=0.0, posinf=0.0)
 
 
-def _duration(movement: Movement, measures: Measures, target: Array) -> Array:
-    """R_d = -(1 - 1 / (1 + 0.6 t_d)) (4.40)."""
-    return np.asarray(-(1 - 1 / (1 + DISCOUNT * measures.settling_time_s)))
+def _duration(movement: Movement, measures: Measures, target: Array, discount: float = DISCOUNT) -> Array:
+    """R_d = -(1 - 1 / (1 + 0.6 t_d)) (4.40), or with another discount rate [1/s]."""
+    return np.asarray(-(1 - 1 / (1 + discount * measures.settling_time_s)))
 
 
 def _overshoot(movement: Movement, measures: Measures, target: Array) -> Array:
@@ -150,13 +155,23 @@ def _force(movement: Movement, measures: Measures, target: Array) -> Array:
     return np.zeros(len(target)) if excess is None else -np.nan_to_num(np.maximum(excess, 0.0), posinf=0.0)
 
 
-_COMMON = (Term("energy", _energy), Term("duration", _duration, -1.0), Term("overshoot", _overshoot, -10.0))
+_ACCURACY, _ENERGY, _OVERSHOOT = (
+    Term("accuracy", _accuracy, -1.0),
+    Term("energy", _energy),
+    Term("overshoot", _overshoot, -10.0),
+)
+_DURATION = Term("duration", _duration, -1.0)
+_HASTE = Term("duration", partial(_duration, discount=IMPATIENT_DISCOUNT), -1.0)
 
 JUDGES: Registry[Judge] = Registry(
     "judge",
     {
-        "orientation": Judge("orientation", (Term("accuracy", _accuracy, -1.0), *_COMMON)),
-        "gaze": Judge("gaze", (Term("accuracy", _gaze_accuracy, -1.0), *_COMMON, Term("force", _force))),
+        "orientation": Judge("orientation", (_ACCURACY, _ENERGY, _DURATION, _OVERSHOOT)),
+        "impatient": Judge("orientation", (_ACCURACY, _ENERGY, _HASTE, _OVERSHOOT)),
+        "gaze": Judge(
+            "gaze",
+            (Term("accuracy", _gaze_accuracy, -1.0), _ENERGY, _DURATION, _OVERSHOOT, Term("force", _force)),
+        ),
     },
     Judge,
 )

@@ -23,10 +23,10 @@ from orient_eye.errors import InputError
 from orient_eye.movement import Movement
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.plants import Plant, restore_plant
+from orient_eye.plants import Plant, PulseRates, restore_plant
 from orient_eye.plants.fixation import knows_elastics
 from orient_eye.state import State, unit
-from orient_eye.task.actions import ACTIONS, ActionSpace, restore_actions
+from orient_eye.task.actions import ACTIONS, K0_RANGE, ActionSpace, restore_actions
 from orient_eye.task.cases import CASES, Case
 from orient_eye.task.judge import JUDGES, Reward
 from orient_eye.task.known_weights import with_known_weights
@@ -154,6 +154,8 @@ class SaccadeTask:
         make, options = ACTIONS[actions or targets.actions], dict(action_options or {})
         if targets.pulse_rates is not None:
             options["rates"] = targets.pulse_rates
+        elif case.B is not None and plant.pulse_rates is None:
+            options["rates"] = PulseRates(case.B, K0_RANGE)
         unknown = set(options) - set(inspect.signature(make).parameters)
         if unknown:
             raise InputError(
@@ -161,7 +163,12 @@ class SaccadeTask:
                 f"{', '.join(sorted(unknown))}; leave it out, or choose other targets"
             )
         meant = make(plant, driven or targets.driven, pulse=case.pulse, C=case.C, speed_limit=speed_limit, **options)
-        judge = judge or targets.of
+        judge = judge or case.judge or targets.of
+        if JUDGES[judge].of != JUDGES[targets.of].of:
+            raise InputError(
+                f"judge {judge!r} looks at {JUDGES[judge].of}, {targets.name} targets are of {JUDGES[targets.of].of}; "
+                "choose another case, or other targets"
+            )
         told = JUDGES[judge].weights(JUDGES[judge].any_weights if weights is None else weights)
         if horizon_s is None:
             horizon_s = targets.horizon_s or plant.horizon_s or HORIZON_S

@@ -1,6 +1,5 @@
 """Peak velocity, duration and skewness of saccades, beside those of people."""
 
-import csv
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,6 +7,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from orient_eye.figures import tidy
+from orient_eye.human import human_values, studies
 from orient_eye.learning.figures.saccades import (
     HUMAN,
     LEARNED,
@@ -20,7 +20,6 @@ from orient_eye.learning.figures.saccades import (
     titled,
 )
 from orient_eye.learning.policy import Policy
-from orient_eye.resources import data_folder
 from orient_eye.task.saccade import SaccadeTask
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def figure_5_4(policy: Policy, task: SaccadeTask) -> Figure:
         axes.set_ylim(bottom=0)
         axes.legend(frameon=False, fontsize="small")
     skewness.legend(
-        frameon=False, fontsize="small", title="human durations: 21 ms + 2.2 ms/deg", title_fontsize="small"
+        frameon=False, fontsize="small", title="durations of people: 21 ms + 2.2 ms/deg", title_fontsize="small"
     )
     for axes in (peak, duration, skewness):
         tidy(axes)
@@ -84,32 +83,17 @@ def draw_main_sequence(axes: "Axes", policy: Policy, task: SaccadeTask) -> None:
 
 def _draw_human(peak: "Axes", duration: "Axes", skewness: "Axes", largest_deg: float) -> None:
     """Human saccades: peak velocity and duration against size, skewness against duration."""
-    with (data_folder("models") / "human" / "main_sequence.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    studies = dict.fromkeys(_study(row) for row in rows)
-    markers = dict(zip(studies, "osDv^P", strict=False))
-    line = {row["quantity"]: float(row["value"]) for row in rows if row["quantity"].startswith("duration_")}
-    for study, marker in markers.items():
+    intercept, slope = (human_values(f"duration_{name}")[0] for name in ("intercept", "slope"))
+    for study, marker in zip(studies(), "osDv^P", strict=False):
         style: dict[str, Any] = {"marker": marker, "ls": "", "color": HUMAN, "ms": 5, "capsize": 2, "elinewidth": 0.8}
-        style["label"] = f"human: {study}"
+        style["label"] = f"people: {study}"
         for quantity, axes in (("peak_velocity", peak), ("duration", duration), ("acceleration_fraction", skewness)):
-            chosen = [row for row in rows if row["quantity"] == quantity and _study(row) == study]
-            x, y = (np.array([float(row[name]) for row in chosen]) for name in ("amplitude_deg", "value"))
-            spread = np.array([float(row["spread_sd"] or 0) for row in chosen])
+            chosen = human_values(quantity, study)
+            x, y, spread = np.array([(row.amplitude_deg, row.value, row.spread) for row in chosen]).reshape(-1, 3).T
             if quantity == "acceleration_fraction":
-                x, y = line["duration_intercept"] + line["duration_slope"] * x, 1 - y
+                x, y = intercept.value + slope.value * x, 1 - y
             if chosen:
-                axes.errorbar(x, y, yerr=spread if spread.any() else None, **style)
+                axes.errorbar(x, y, yerr=None if np.isnan(spread).all() else np.nan_to_num(spread), **style)
     size = np.array([0.0, largest_deg])
-    words = f"human: {line['duration_intercept']:g} ms + {line['duration_slope']:g} ms/deg (Carpenter 1988)"
-    duration.plot(size, line["duration_intercept"] + line["duration_slope"] * size, ":", color=HUMAN, label=words)
-
-
-def _study(row: dict[str, str]) -> str:
-    """Short name of the study a row of the human data is from."""
-    names = {
-        "Collewijn": "Collewijn et al. 1988",
-        "Andersson": "Andersson et al. 2017",
-        "PMC": "100 adults, PMC6143243",
-    }
-    return next((name for part, name in names.items() if part in row["source"]), row["source"])
+    words = f"people: {intercept.value:g} ms + {slope.value:g} ms/deg ({slope.study})"
+    duration.plot(size, intercept.value + slope.value * size, ":", color=HUMAN, label=words)

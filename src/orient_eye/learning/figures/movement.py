@@ -5,7 +5,16 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from orient_eye.figures import tidy
-from orient_eye.learning.figures.saccades import SHOWN_DEG, Saccades, colours, draw_turned, speed, titled, turned
+from orient_eye.learning.figures.saccades import (
+    SHOWN_DEG,
+    Saccades,
+    beside,
+    colours,
+    draw_turned,
+    speed,
+    titled,
+    turned,
+)
 from orient_eye.learning.policy import Policy
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.task.saccade import SaccadeTask
@@ -50,7 +59,7 @@ def figure_5_2(policy: Policy, task: SaccadeTask) -> Figure:
 def figure_5_3(policy: Policy, task: SaccadeTask) -> Figure:
     """The eye under the policy's command and under a pure step to the target (thesis Figures 5.3, 5.7, ...)."""
     shown = Saccades.symmetric(task, policy, _COMPARED_DEG)
-    stepped = _pure_step(shown)
+    stepped = pure_step(shown)
     figure = Figure(figsize=(11, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     for i, (colour, size) in enumerate(zip(colours(len(shown.target)), shown.size_deg, strict=True)):
@@ -60,14 +69,14 @@ def figure_5_3(policy: Policy, task: SaccadeTask) -> Figure:
             right.plot(time, speed(trajectory)[i], style, color=colour)
     left.set(xlabel="time [ms]", ylabel="angle turned [deg]", xlim=(0, 300))
     right.set(xlabel="time [ms]", ylabel="angular speed [deg/s]", xlim=(0, 300))
-    left.set_ylim(0, 1.33 * shown.size_deg.max(initial=0.1))
-    left.legend(frameon=False, fontsize="small", ncols=3, loc="upper center")
+    left.set_ylim(bottom=0)
+    beside(figure, *left.get_legend_handles_labels())
     tidy(left)
     tidy(right)
     return titled(figure, "Motor command of the policy against a pure step", policy, task)
 
 
-def _pure_step(shown: Saccades) -> Trajectory:
+def pure_step(shown: Saccades) -> Trajectory:
     """The motors jump to where the eye rests on the target."""
     task = shown.task
     motor = np.repeat(task.targets.rest(shown.target).motor[:, None], len(shown.trajectory.time), axis=1)

@@ -1,5 +1,6 @@
 """What a policy puts out, against the size of the saccade, beside the searched optimum."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from orient_eye.learning.figures.saccades import (
     LEARNED,
     SIZES_DEG,
     Saccades,
+    beside,
     mean_and_range,
     size_axis,
     titled,
@@ -30,7 +32,9 @@ _LEAST_SHARE = 0.15  # of a number's range that a panel shows, at least where it
 _WIDE = 30.0  # largest over least value from which on a panel without bounds is logarithmic
 
 
-def figure_5_1(policy: Policy, yardstick: Yardstick, table: Yardstick | None = None) -> Figure:
+def figure_5_1(
+    policy: Policy, yardstick: Yardstick, table: Yardstick | None = None, only: Sequence[str] | None = None
+) -> Figure:
     """The numbers of the action, and C where it varies, against saccade size: mean over starting points, and optimum.
 
     Thesis Figures 5.1, 5.5, 5.9, 5.10, 5.14, 5.18, 5.19. One row a driven motor.
@@ -39,13 +43,15 @@ def figure_5_1(policy: Policy, yardstick: Yardstick, table: Yardstick | None = N
         policy: whose output it is.
         yardstick: saccades over the whole range.
         table: symmetric saccades, drawn apart on a plant that is not linear, where the starting point matters.
+        only: symbols that are shown ("C"); None for all.
     """
     task = yardstick.task
     output = _Output.of(policy, yardstick)
-    motors = list(dict.fromkeys(motor for motor, _ in output.keys))
-    rows = [[key for key in output.keys if key[0] == motor] for motor in motors]
+    keys = [key for key in output.keys if only is None or key[1].split()[0] in only]
+    motors = list(dict.fromkeys(motor for motor, _ in keys))
+    rows = [[key for key in keys if key[0] == motor] for motor in motors]
     most = max(map(len, rows))
-    figure = Figure(figsize=(4.6 * most, 4.3 * len(rows)), layout="constrained")
+    figure = Figure(figsize=(max(4.6 * most, 7.0), 4.3 * len(rows)), layout="constrained")
     for motor, keys, panels in zip(motors, rows, figure.subplots(len(rows), most, squeeze=False), strict=True):
         for axes, key in zip(panels, keys, strict=False):
             output.draw(axes, key)
@@ -53,28 +59,33 @@ def figure_5_1(policy: Policy, yardstick: Yardstick, table: Yardstick | None = N
                 _draw_symmetric(axes, key, policy, table)
         for unused in panels[len(keys) :]:
             unused.set_visible(False)
-        panels[0].legend(frameon=False, fontsize="small")
         if len(motors) > 1:
             panels[0].set_title(motor, loc="left")
+    beside(figure, *figure.axes[0].get_legend_handles_labels())
     return titled(figure, "Policy output against saccade size", policy, task)
 
 
 def figure_5_25(policy: Policy, yardstick: Yardstick) -> Figure:
     """Energy of the command against saccade size, beside the optimum's (thesis Figure 5.25)."""
-    task = yardstick.task.plain
     figure = Figure(figsize=(7.5, 5), layout="constrained")
     axes = figure.subplots()
+    draw_energy(axes, policy, yardstick)
+    axes.set(ylabel="energy [deg$^2$/s]")
+    axes.legend(frameon=False, loc="upper left")
+    return titled(figure, "Energy against saccade size", policy, yardstick.task.plain)
+
+
+def draw_energy(axes: "Axes", policy: Policy, yardstick: Yardstick) -> None:
+    """Energy against size, of a policy and of the optimum."""
+    task = yardstick.task.plain
     best = task.actions.command(yardstick.start, yardstick.target, yardstick.optimum.action).energy()
     axes.plot(yardstick.size_deg, best, ".", color=BEST, ms=6, label="searched optimum")
     every = Saccades.every_size(yardstick.task, policy)
     energy = task.actions.command(every.start, every.target, every.action).energy()
     mean_and_range(axes, every.size_deg, energy, LEARNED, "policy")
     size_axis(axes, task)
-    axes.set(ylabel="energy [deg$^2$/s]")
     axes.set_ylim(bottom=0)
-    axes.legend(frameon=False)
     tidy(axes)
-    return titled(figure, "Energy against saccade size", policy, task)
 
 
 def draw_output(panels: "NDArray[Any]", policy: Policy, yardstick: Yardstick) -> None:
@@ -114,7 +125,7 @@ class _Output:
         shown = size >= SIZES_DEG[0]  # where there is nothing to do, B, k0 and C may be anything
         axes.plot(size[shown], self.best[key][shown], ".", color=BEST, ms=6, label="searched optimum")
         values = self.ours[key]
-        mean_and_range(axes, self.every.size_deg, values, LEARNED, "policy, mean over starting points")
+        mean_and_range(axes, self.every.size_deg, values, LEARNED, "policy")
         size_axis(axes, task)
         number = next((told for told in told_numbers(task) if (told.motor, told.title) == key), None)
         axes.set(ylabel=f"|{number.label}| [{number.unit}]" if number and number.from_start else key[1])

@@ -7,10 +7,11 @@ from matplotlib.figure import Figure
 
 from orient_eye.figures import tidy
 from orient_eye.learning.evaluation import Yardstick, told_numbers, told_values
-from orient_eye.learning.figures.saccades import BEST, LEARNED, THIRD, titled
+from orient_eye.learning.figures.saccades import BEST, LEARNED, THIRD, beside, titled
 from orient_eye.learning.policy import Policy
 
 _POINTS = 351
+_FLOOR = 1e-4  # of the best cost: what is less does not matter, but accuracy, which is well satisfied, is seen
 _TERMS = (THIRD, "#e09f3e", "#7d5ba6", "#6c757d", "#b56576", "#355070")
 
 
@@ -40,7 +41,7 @@ def figure_5_24(policy: Policy, table: Yardstick, amplitude_deg: float = 30.0) -
     learned = one.plain(told)
     figure = Figure(figsize=(9, 5), layout="constrained")
     axes = figure.subplots()
-    floor = 0.02 * float(-one.optimum.reward[0])
+    floor = _FLOOR * float(-one.optimum.reward[0])
     for i, (name, values) in enumerate(found.terms.items()):
         cost = -task.weights[name] * values
         if cost.max() > floor:
@@ -59,7 +60,7 @@ def figure_5_24(policy: Policy, table: Yardstick, amplitude_deg: float = 30.0) -
     )
     way = "" if one.ways is None else f" {one.ways[0]}"
     axes.set_title(textwrap.fill(f"saccade of {one.size_deg[0]:.4g} deg{way}; {held}", 90), fontsize="medium")
-    axes.legend(frameon=False, fontsize="small", ncols=2)
+    beside(figure, *axes.get_legend_handles_labels())
     tidy(axes)
     return titled(figure, f"Reward against {names[varied]}", policy, task)
 

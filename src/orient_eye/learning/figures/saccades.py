@@ -1,8 +1,9 @@
 """The saccades that pictures show, and how pictures draw them alike."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -120,8 +121,13 @@ def mean_and_range(axes: "Axes", size: Array, values: Array, colour: str, label:
     sizes = np.unique(size)
     groups = [values[size == one] for one in sizes]
     low, mean, high = np.array([(np.nanmin(g), np.nanmean(g), np.nanmax(g)) for g in groups]).T
-    axes.fill_between(sizes, low, high, color=colour, alpha=0.2, lw=0)
-    axes.plot(sizes, mean, color=colour, lw=1.8, label=label)
+    axes.fill_between(sizes, low, high, color=colour, alpha=0.2, lw=0, label=f"{label}, over all starting points")
+    axes.plot(sizes, mean, color=colour, lw=1.8, label=f"{label}, mean")
+
+
+def beside(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
+    """A legend below all panels, where it covers no data."""
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize="small")
 
 
 def draw_turned(axes: "Axes", shown: Saccades) -> None:

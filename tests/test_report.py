@@ -1,0 +1,115 @@
+"""orient-eye report: every figure of the thesis is there and says its number; the page needs nothing outside itself."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import altair
+import pytest
+
+from orient_eye.cli import main
+from orient_eye.errors import InputError
+from orient_eye.report import EXHIBITS, Evidence, chosen_figures, write_report
+from orient_eye.report.exhibit import Drawn
+from orient_eye.report.page import save_figure, write_page
+
+OF_THESIS = ["2.2", "3.5", "3.6", "4.3", "4.4", "4.5", "4.6", "4.9", *(f"5.{n}" for n in range(1, 26))]
+QUICK = ("2.2", "4.9", "5.3", "5.10", "5.24")
+
+
+@pytest.fixture(scope="module")
+def evidence() -> Evidence:
+    return Evidence(pairs=20)
+
+
+@pytest.fixture(scope="module")
+def folder(evidence: Evidence, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("report")
+    write_report(place, evidence, QUICK)
+    return place
+
+
+class Links(HTMLParser):
+    """Addresses that a browser would fetch, and ids."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fetched: list[str] = []
+        self.ids: list[str] = []
+        self.anchors: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if name in ("src", "srcset", "data", "poster") or (name == "href" and tag in ("link", "image", "use")):
+                self.fetched.append(value or "")
+            elif name == "href":
+                self.anchors.append(value or "")
+            elif name == "id":
+                self.ids.append(value or "")
+
+
+def test_every_figure_of_the_thesis_is_in_the_report() -> None:
+    assert [name for name in EXHIBITS if re.fullmatch(r"\d\.\d+", name)] == OF_THESIS
+    for name in EXHIBITS:
+        exhibit = EXHIBITS[name]
+        assert exhibit.title
+        assert exhibit.caption.endswith(".")
+
+
+def test_the_page_needs_nothing_outside_itself(folder: Path) -> None:
+    text = (folder / "index.html").read_text(encoding="utf-8")
+    links = Links()
+    links.feed(text)
+    assert len(links.fetched) == len(QUICK)
+    assert all(address.startswith("data:") for address in links.fetched)
+    assert "@import" not in text
+    assert not re.search(r"url\(|fetch\(|https?://", text)
+    assert {anchor.removeprefix("#") for anchor in links.anchors} <= set(links.ids)
+
+
+def test_every_figure_is_there_as_svg_and_png_and_says_its_number(folder: Path, evidence: Evidence) -> None:
+    for name in QUICK:
+        assert (folder / "figures" / f"{name}.svg").read_text(encoding="utf-8").rstrip().endswith("</svg>")
+        assert (folder / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        drawn = EXHIBITS[name].draw(evidence)
+        assert re.search(r"\d", drawn.says)
+        assert drawn.says.endswith(".")
+
+
+def test_the_same_evidence_gives_the_same_picture(folder: Path, evidence: Evidence, tmp_path: Path) -> None:
+    write_report(tmp_path, evidence, ("4.9",))
+    assert (tmp_path / "figures" / "4.9.svg").read_bytes() == (folder / "figures" / "4.9.svg").read_bytes()
+
+
+def test_the_interactive_page_carries_its_script(evidence: Evidence, tmp_path: Path) -> None:
+    chart = altair.Chart({"values": [{"a": 1, "b": 2, "who": "</script>"}]}).mark_point().encode(x="a:Q", y="b:Q")
+    drawn = Drawn(chart, "One point.")
+    svg = save_figure(drawn, tmp_path, "x")
+    page = write_page(tmp_path / "index.html", {"x": (EXHIBITS["2.2"], drawn, svg)}, (), "t", "i", "m")
+    text = page.read_text(encoding="utf-8")
+    assert "vegaEmbed(document.getElementById" in text
+    assert text.count("<script>") == text.count("</script>") == 2
+    links = Links()
+    links.feed(text)
+    assert not links.fetched
+
+
+def test_unknown_figures_and_runs_that_are_none_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(InputError, match=r"unknown exhibit '9\.9'"):
+        chosen_figures(["9.9"])
+    for arguments in (["--figures", "9.9"], [str(tmp_path / "none")], ["--figures", ""], ["--pairs", "0"]):
+        with pytest.raises(SystemExit) as stop:
+            main(["report", *arguments, "--out", str(tmp_path / "out"), "--quiet"])
+        assert stop.value.code == 2
+        assert not (tmp_path / "out").exists()
+    capsys.readouterr()
+
+
+def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["report", "--figures", "4.4, 2.2", "--out", str(tmp_path / "out"), "--quiet", "--json"])
+    assert stop.value.code == 0
+    told = json.loads(capsys.readouterr().out)
+    assert list(told["figures"]) == ["2.2", "4.4"]
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"index.html", "figures", "run.json", "result.json"}
