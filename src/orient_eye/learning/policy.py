@@ -132,8 +132,8 @@ class Policy:
     def within(self, task: SaccadeTask, random: np.random.Generator) -> "Policy":
         """The same policy with its actions told in the bounds of a task: itself, or with its last layer fitted anew.
 
-        The fit, by least squares over random saccades, is of what goes into the last tanh; actions beyond the bounds are
-        at them.
+        The fit, by least squares over random saccades, is of what goes into the last tanh; actions beyond the bounds
+        are at them.
 
         Args:
             task: with the same numbers.
