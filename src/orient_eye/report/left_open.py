@@ -112,9 +112,9 @@ EXHIBITS = {
     "k0-amplitude": Exhibit(
         _CHAPTER,
         "k0 and D learned on the whole eye, beside w0 and K of its step responses",
-        "The thesis expected k0 to follow w0 on a non-linear eye, and did not show it: the best k0 falls with amplitude as "
-        "w0 does. D follows K of large saccades; small ones end short of the target on purpose, as the last tenths of a "
-        "degree cost more energy than their accuracy is worth.",
+        "The thesis expected k0 to follow w0 on a non-linear eye, and did not show it: the best k0 falls with "
+        "amplitude as w0 does. D follows K of large saccades; small ones end short of the target on purpose, as the "
+        "last tenths of a degree cost more energy than their accuracy is worth.",
         _amplitude,
     ),
     "transfer": Exhibit(
