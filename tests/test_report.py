@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from orient_eye.cli import main
 from orient_eye.errors import InputError
+from orient_eye.learning.policy import shipped_policies
 from orient_eye.report import EXHIBITS, Evidence, chosen_figures, write_report
 from orient_eye.report.exhibit import Drawn
 from orient_eye.report.page import save_figure, write_page
@@ -113,3 +115,25 @@ def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureF
     told = json.loads(capsys.readouterr().out)
     assert list(told["figures"]) == ["2.2", "4.4"]
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"index.html", "figures", "run.json", "result.json"}
+
+
+def test_a_policy_without_the_course_of_its_training_is_refused_where_that_is_shown(tmp_path: Path) -> None:
+    for case in ("2-varying", "3-varying"):
+        folder = tmp_path / case
+        shutil.copytree(shipped_policies()[f"lpf-{case}"], folder)
+        (folder / "metrics.csv").write_text("update,saccades\n0,0\n", encoding="utf-8")
+    evidence = Evidence([tmp_path / "2-varying", tmp_path / "3-varying"], pairs=20)
+    with pytest.raises(InputError, match=r"brings no metrics\.csv with reward_mean; give the run directory"):
+        write_report(tmp_path / "out", evidence, ["5.23"])
+    assert not (tmp_path / "out" / "index.html").exists()
+
+
+def test_a_run_stands_in_for_the_shipped_policy_of_its_kind(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(shipped_policies()["lpf-1"], run)
+    names = Evidence([run]).names()
+    assert str(run) in names
+    assert "lpf-1" not in names
+    assert len(names) == len(shipped_policies())
+    with pytest.raises(InputError, match=r"no policy of plant 'lpf' and case 'none'.*--case none"):
+        Evidence().policy("lpf", "none")

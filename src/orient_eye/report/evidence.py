@@ -35,6 +35,7 @@ from orient_eye.task.saccade import SaccadeTask
 Array = NDArray[np.float64]
 COURSE = "metrics.csv"
 """How a training went, beside its policy."""
+_OF_COURSE = ("saccades", "reward_mean")
 STEPS_DEG, HELD_OUT_DEG = tuple(float(a) for a in range(1, 26)), (7.5, 12.5, 17.5)
 """Amplitudes of the motor's steps, as `orient-eye sysid` takes them; those after them are not fitted."""
 MAIN_SEQUENCE_DEG = np.array([1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12.5, 15, 17.5, 20, 25, 30, 35, 40, 50, 60], float)
@@ -80,10 +81,14 @@ class Judged:
         """Columns of its training's metrics by name.
 
         Raises:
-            InputError: it brings none.
+            InputError: it brings none, or not all of them.
         """
-        if not self.metrics:
-            raise InputError(f"policy {self.name} brings no {COURSE}; give the run directory of its training")
+        missing = [name for name in _OF_COURSE if name not in self.metrics]
+        if missing:
+            raise InputError(
+                f"policy {self.name} brings no {COURSE} with {', '.join(missing)}; give the run directory of its "
+                "training"
+            )
         return self.metrics
 
     @cached_property
@@ -178,7 +183,7 @@ class Evidence:
             usual = policy.manifest.get("result", {}).get("pairs") or task.plant.evaluation_pairs
             pairs, table = evaluation_saccades(task, self.pairs or usual, carried=folder / OPTIMUM)
             course = folder / COURSE
-            columns = read_table(course, "update,saccades,reward_mean").columns if course.exists() else {}
+            columns = read_table(course, ",".join(_OF_COURSE)).columns if course.exists() else {}
             self._judged[name] = Judged(name, policy, pairs, table, columns)
         return self._judged[name]
 
