@@ -51,7 +51,9 @@ def _run(words: str, *outputs: str, **more: bool) -> Line:
     return Line(f"{words} --out {{out}}", ("run.json", *outputs), whole_run=True, **more)
 
 
-_PICTURES = tuple(f"figure_5_{number}.png" for number in (1, 2, 3, 4, 24, 25))
+_PICTURES = tuple(
+    f"{name}.png" for name in ("policy_output", "saccades", "pure_step", "main_sequence", "reward_against_k0", "energy")
+)
 _SHORT = "--updates 8 --warmup 64 --batch-size 16 --evaluation-pairs 3 --quiet"
 LINES = {
     "simulate": _run(
@@ -80,6 +82,7 @@ LINES = {
     "optimum": Line("optimum --pairs {given}/pairs.csv --quiet --out {out}/best.csv", ("best.csv",)),
     "weights": Line("weights --case 1"),
     "models": Line("models"),
+    "report": _run("report --figures 2.2,5.1 --pairs 5 --quiet", "result.json", "index.html", "figures/5.1.png"),
     "validate": Line("validate --random-runs 1", slow=True),
     "listing": _run(
         "listing --plant viscous --quiet", "result.json", "statics.csv", "workspace.png", "torsion.png", "plane.png",
@@ -136,13 +139,18 @@ def _read_rrd(path: Path) -> None:
     subprocess.run([viewer._executable(), "rrd", "verify", str(path)], check=True, capture_output=True)
 
 
+def _ends(path: Path, last: str) -> None:
+    assert path.read_text(encoding="utf-8").rstrip().endswith(last)
+
+
 READERS: dict[str, Callable[[Path], object]] = {
     ".json": lambda path: json.loads(path.read_text(encoding="utf-8")),
     ".csv": _read_csv,
     ".png": imread,
     ".npz": _read_npz,
     ".zip": _read_zip,
-    ".pt": _read_zip,
+    ".html": lambda path: _ends(path, "</html>"),
+    ".svg": lambda path: _ends(path, "</svg>"),
     ".onnx": _read_onnx,
     ".safetensors": _read_safetensors,
     ".rrd": _read_rrd,
