@@ -129,8 +129,8 @@ def test_main_sequence_by_direction_beside_people() -> None:
     for name in ("horizontal", "vertical", "oblique"):
         assert f"{name}: $V_0$ = 400 deg/s, c = 10.0 deg" in told
         assert f"{name}: 20 ms + 3.0 ms/deg" in told
-    assert "human: Andersson et al. 2017" in told
-    assert "human, vertical: 100 adults" in told
+    assert "people: Andersson et al. 2017" in told
+    assert "people, vertical: Hopf et al. 2018" in told
     proportional = replace(measures, peak_velocity_deg_s=12 * measures.amplitude_deg)
     assert "12.0 deg/s a deg, no saturation" in words(pictures.main_sequence(trajectory, proportional))
 

@@ -9,7 +9,7 @@ import orient_eye
 
 SOURCE = Path(orient_eye.__file__).parent
 FLOORS = [
-    ["errors", "checks", "constants", "words", "registry", "resources"],
+    ["errors", "cached", "checks", "constants", "words", "registry", "resources"],
     ["files", "tables", "rotations", "listing", "motor", "state", "progress", "run_directory", "rig"],
     ["commands"],
     ["movement", "human"],

@@ -13,12 +13,14 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import ProcessPoolExecutor
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import orient_eye
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
 from orient_eye.motor import names
@@ -264,3 +266,10 @@ def test_every_plant_says_that_it_is_safe() -> None:
 def test_statics_keep_nothing_of_a_plant() -> None:
     plant = used("modal")
     np.testing.assert_array_equal(degrees_per_motor(plant), degrees_per_motor(copy.deepcopy(plant)))
+
+
+def test_no_lock_of_all_instances_stands_between_threads_and_forks() -> None:
+    """That of functools' cached properties, before Python 3.12."""
+    source = Path(orient_eye.__file__).parent
+    users = [f.name for f in source.rglob("*.py") if "from functools import cached_property" in f.read_text("utf-8")]
+    assert users == ["cached.py"]

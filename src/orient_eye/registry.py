@@ -13,10 +13,10 @@ entry points, in the group `orient_eye.` + the registry's name in the plural:
 
 import importlib
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from importlib import metadata
 from typing import Any, Generic, TypeVar, cast
 
+from orient_eye.cached import cached_property
 from orient_eye.errors import InputError
 
 T = TypeVar("T")

@@ -13,12 +13,12 @@ of the integrator [1/s], C rate of the pulse's onset [1/s], A its height, V the 
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orient_eye.cached import cached_property
 from orient_eye.commands.exponentials import ExponentialSum, filter_energy
 from orient_eye.commands.pulses import PULSES, Pulse
 from orient_eye.errors import InputError

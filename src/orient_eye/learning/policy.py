@@ -38,6 +38,7 @@ NAME = "policy.safetensors"
 _FORMAT = "orient-eye policy 2"
 _OLD_NAME = "policy.json"  # of format 1
 _METADATA = "orient-eye"  # the one key: safetensors would write several in any order
+_ALIKE = 0.05  # of a bound
 _FITTED, _EDGE = 4096, 0.999  # saccades of a fit, and how near to the bounds of tanh it goes
 _LARGEST_BYTES = 64 * 2**20  # the thesis' networks have 0.1 MB
 
@@ -130,7 +131,10 @@ class Policy:
         return x
 
     def within(self, task: SaccadeTask, random: np.random.Generator) -> "Policy":
-        """The same policy with its actions told in the bounds of a task: itself, or with its last layer fitted anew.
+        """The same policy with its actions told in the bounds of a task: with its last layer fitted anew.
+
+        It is itself where they differ by `_ALIKE` at most, as between an eye and its surrogate; then what it says is
+        taken as shares of the task's bounds.
 
         The fit, by least squares over random saccades, is of what goes into the last tanh; actions beyond the bounds
         are at them.
@@ -140,7 +144,8 @@ class Policy:
             random: draws the saccades.
         """
         low, high, log = task.actions.low, task.actions.high, task.actions.log
-        if all(np.array_equal(*pair) for pair in ((self.low, low), (self.high, high), (self.log, log))):
+        alike = all(np.allclose(*pair, rtol=_ALIKE) for pair in ((self.low, low), (self.high, high)))
+        if alike and np.array_equal(self.log, log):
             return self
         start, target = task.targets.draw(_FITTED, random)
         inputs = np.column_stack([self._hidden(start.orientation, target), np.ones(_FITTED)])

@@ -10,12 +10,13 @@ A movement is either sampled (`SampledMovement`) or a closed form, which stands 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.cached import cached_property
 from orient_eye.commands import Command, path_energy
 from orient_eye.constants import BAND, DOUBT
 from orient_eye.movement.measures import Measures, View, measure, merged, merged_rows

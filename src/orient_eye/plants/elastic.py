@@ -1,7 +1,6 @@
 """What the plants of the elastic eye have in common: its compiled model, and where it comes to rest."""
 
 from abc import abstractmethod
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from orient_eye.cached import cached_property
 from orient_eye.checks import whole
 from orient_eye.constants import HORIZON_S
 from orient_eye.eyes import model as eyes

@@ -6,7 +6,6 @@ one that a limit of the motor changes, is a path of straight lines between sampl
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.cached import cached_property
 from orient_eye.commands import Sampled, as_command, checked_step
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND, HORIZON_S, STEP_S

@@ -13,12 +13,12 @@ g + g' / k0, and its distance from the end the integral of g from now on, less g
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.cached import cached_property
 from orient_eye.commands.exponentials import Modes, Numbers, impulse_response
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND

@@ -9,12 +9,12 @@ another gain rests elsewhere. Without a random generator it is the nominal plant
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.cached import cached_property
 from orient_eye.commands import as_command
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import BAND

@@ -7,7 +7,6 @@ evidence.policy("lpf", "2-varying").pairs        # its evaluation saccades, with
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from orient_eye.cached import cached_property
 from orient_eye.checks import whole
 from orient_eye.errors import InputError
 from orient_eye.files import read_json

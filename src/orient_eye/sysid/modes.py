@@ -11,7 +11,6 @@ showed. Others like these judge.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise, product
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from orient_eye.cached import cached_property
 from orient_eye.checks import real, whole
 from orient_eye.commands import Command, Sampled
 from orient_eye.commands.pulse_step import PulseStep

@@ -12,12 +12,12 @@ action is a class with these members and a line in `ACTIONS`.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orient_eye.cached import cached_property
 from orient_eye.checks import real
 from orient_eye.commands import Command
 from orient_eye.commands.pulse_step import PulseStep

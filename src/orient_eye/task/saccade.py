@@ -163,12 +163,12 @@ class SaccadeTask:
                 f"{', '.join(sorted(unknown))}; leave it out, or choose other targets"
             )
         meant = make(plant, driven or targets.driven, pulse=case.pulse, C=case.C, speed_limit=speed_limit, **options)
-        judge = judge or case.judge or targets.of
-        if JUDGES[judge].of != JUDGES[targets.of].of:
+        if case.judge is not None and JUDGES[case.judge].of != JUDGES[targets.of].of:
             raise InputError(
-                f"judge {judge!r} looks at {JUDGES[judge].of}, {targets.name} targets are of {JUDGES[targets.of].of}; "
-                "choose another case, or other targets"
+                f"the case's judge looks at {JUDGES[case.judge].of}, {targets.name} targets are of "
+                f"{JUDGES[targets.of].of}; choose another case, or other targets"
             )
+        judge = judge or case.judge or targets.of
         told = JUDGES[judge].weights(JUDGES[judge].any_weights if weights is None else weights)
         if horizon_s is None:
             horizon_s = targets.horizon_s or plant.horizon_s or HORIZON_S

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.cached import cached_property
 from orient_eye.figures import DATA, MODEL, OTHER, tidy
 from orient_eye.learning.directions import angles_toward, size_deg
 from orient_eye.learning.policy import Policy
