@@ -201,6 +201,13 @@ def test_what_rests_is_held(name: str, data: st.DataObject) -> None:
 rate = st.floats(1e-2, 1e4)
 
 
+def test_a_motor_that_stands_and_has_no_rate_fails_too() -> None:
+    for rates in ({"B": [[1.0]], "k0": [[1e300]]}, {"B": [[np.nan]], "k0": [[1.0]]}):
+        command = PulseStep(F=[[0.0]], D=[[0.0]], **rates)
+        assert np.isnan(command.position([0.0, 0.01])).all()
+        assert np.isnan(command.rate([0.0, 0.01])).all()
+
+
 @budget(100)
 @given(st.sampled_from(sorted(PULSES)), st.data())
 def test_pulse_steps_of_anything(name: str, data: st.DataObject) -> None:

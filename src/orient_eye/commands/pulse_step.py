@@ -74,6 +74,8 @@ class PulseStep:
             if positive and (array <= 0).any():
                 raise InputError(f"{name} must be positive, got {array.min():g}")
             object.__setattr__(self, name, sane(array, 1 / LARGEST if positive else 0.0))
+        known = np.isfinite([getattr(self, name) for name in told]).all(axis=0)
+        object.__setattr__(self, "F", np.where(known, self.F, np.nan))  # nor is a motor that stands told so
         given: Any = self.too_fast
         object.__setattr__(self, "too_fast", np.zeros(len(self.F), bool) if given is None else given)
 
