@@ -15,6 +15,7 @@ from orient_eye import figures
 from orient_eye.figures import gaze as pictures
 from orient_eye.listing import directions, ficks_torsion, with_torsion
 from orient_eye.motor import Motor
+from orient_eye.movement.main_sequence import fit_peak_velocity
 from orient_eye.movement.measures import Measures, measure
 from orient_eye.movement.trajectory import Trajectory
 
@@ -114,7 +115,7 @@ def test_components_tell_how_they_go_together() -> None:
 def test_saturation_is_found_again(V0: float, c: float, noise: float) -> None:
     amplitude = np.linspace(1, 60, 30)
     peak = V0 * (1 - np.exp(-amplitude / c)) * (1 + noise * np.cos(9 * amplitude))
-    np.testing.assert_allclose(pictures.saturation(amplitude, peak), (V0, c), rtol=1e-6 + 20 * noise)
+    np.testing.assert_allclose(fit_peak_velocity(amplitude, peak), (V0, c), rtol=1e-6 + 20 * noise)
 
 
 def test_main_sequence_by_direction_beside_people() -> None:

@@ -87,8 +87,12 @@ def test_saccades_without_numbers_are_left_out_of_a_fit_and_too_few_are_refused(
     peak = 500 * (1 - np.exp(-amplitude / 5))
     with_holes = np.append(peak, np.nan)
     assert fit_peak_velocity(np.append(amplitude, 7), with_holes) == pytest.approx((500, 5), rel=1e-4)
-    with pytest.raises(InputError, match=r"at least 4 saccades.*got 3"):
-        fit_main_sequence(amplitude[:3], peak[:3], peak[:3])
+    with pytest.raises(InputError, match=r"at least 3 saccades.*got 2"):
+        fit_main_sequence(amplitude[:2], peak[:2], peak[:2])
+    with pytest.raises(InputError, match="one number a saccade in each, got 6, 5"):
+        fit_peak_velocity(amplitude, peak[:5])
+    with pytest.raises(InputError, match="peak velocities are above 0, got 0 deg/s"):
+        fit_peak_velocity(amplitude, 0 * peak)
 
 
 def test_people_are_told_with_their_sources() -> None:

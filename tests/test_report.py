@@ -123,7 +123,7 @@ def test_a_policy_without_the_course_of_its_training_is_refused_where_that_is_sh
         shutil.copytree(shipped_policies()[f"lpf-{case}"], folder)
         (folder / "metrics.csv").write_text("update,saccades\n0,0\n", encoding="utf-8")
     evidence = Evidence([tmp_path / "2-varying", tmp_path / "3-varying"], pairs=20)
-    with pytest.raises(InputError, match=r"brings no metrics\.csv with reward_mean; give the run directory"):
+    with pytest.raises(InputError, match=r"brings no metrics\.csv with reward_mean, gap_mean; give the run directory"):
         write_report(tmp_path / "out", evidence, ["5.23"])
     assert not (tmp_path / "out" / "index.html").exists()
 

@@ -1,7 +1,7 @@
 """The `--human` of orient-eye weights: the weights whose best saccades have people's main sequence."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from math import nan
 from typing import TYPE_CHECKING, Any
 
 from orient_eye.errors import InputError
@@ -95,8 +95,10 @@ def nearest_to_people(
         f"1, B from {_B[0]:g} to {_B[1]:g} 1/s."
     )
     say(table(title, columns, rows, left=("pulse", "what keeps it from being nearer")))
-    say("orient-eye train --case human trains with the best of them on the low-pass eye")
-    return {"plant": plant.identity(), "wanted": asdict(wanted), "found": rows}
+    if like is None:
+        say("orient-eye train --case human trains with the best that was found on the thesis' eyes (docs/human.md)")
+    told = {key: getattr(wanted, key) for key in ("V0", "c", "D0_ms", "d_ms")}
+    return {"plant": plant.identity(), "wanted": told, "found": rows}
 
 
 def _wanted(like: Sequence[float]) -> "MainSequence":
@@ -112,4 +114,4 @@ def _wanted(like: Sequence[float]) -> "MainSequence":
     c = real("c of --like", like[1], 0.1, 1000, unit="deg")
     D0 = real("D0 of --like", like[2], 0, 1000, unit="ms")
     d = real("d of --like", like[3], 0, 100, unit="ms/deg")
-    return MainSequence(V0, c, D0, d, k=1e-3 * V0 * (D0 / max(c, 1e-9) + d), V_r2=1.0, D_r2=1.0, k_spread=0.0)
+    return MainSequence(V0, c, D0, d, k=nan, V_r2=nan, D_r2=nan, k_spread=nan)

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import curve_fit
+from scipy.optimize import minimize_scalar
 
 from orient_eye.errors import InputError
 
 Array = NDArray[np.float64]
-_LEAST = 4
+_LEAST = 3
 """Saccades of a fit: more than its numbers."""
 
 
@@ -60,13 +60,23 @@ def exponential(amplitude_deg: Array, V0: float, c: float) -> Array:
 def fit_peak_velocity(amplitude_deg: ArrayLike, peak_velocity_deg_s: ArrayLike) -> tuple[float, float]:
     """V0 [deg/s] and c [deg] of V = V0 (1 - exp(-A/c)), by least squares.
 
+    c is looked for up to 1000 times the largest amplitude, where the curve is a line; V0 follows from it.
+
     Raises:
-        InputError: fewer than four finite values, or none that grow with amplitude.
+        InputError: fewer than three finite values, or none above 0.
     """
     A, V = _finite(amplitude_deg, peak_velocity_deg_s)
-    top = float(V.max())
-    (V0, c), _ = curve_fit(exponential, A, V, p0=(top, float(np.median(A))), bounds=((0, 1e-3), (100 * top, 1e4)))
-    return float(V0), float(c)
+    if V.max() <= 0:
+        raise InputError(f"peak velocities are above 0, got {V.max():g} deg/s at most; give those of saccades")
+
+    def fit(log_c: float) -> tuple[float, float]:
+        shape = -np.expm1(-A / np.exp(log_c))
+        V0 = float(shape @ V / (shape @ shape))
+        return V0, float(((V - V0 * shape) ** 2).sum())
+
+    bounds = np.log([A.min() / 100, 1000 * A.max()])
+    log_c = minimize_scalar(lambda x: fit(x)[1], bounds=bounds, method="bounded", options={"xatol": 1e-9}).x
+    return fit(log_c)[0], float(np.exp(log_c))
 
 
 def fit_main_sequence(amplitude_deg: ArrayLike, peak_velocity_deg_s: ArrayLike, duration_s: ArrayLike) -> MainSequence:
@@ -78,7 +88,7 @@ def fit_main_sequence(amplitude_deg: ArrayLike, peak_velocity_deg_s: ArrayLike, 
         duration_s: (saccades,).
 
     Raises:
-        InputError: fewer than four saccades are left.
+        InputError: fewer than three saccades are left, or columns of unequal length.
     """
     A, V, D = _finite(amplitude_deg, peak_velocity_deg_s, duration_s)
     V0, c = fit_peak_velocity(A, V)
@@ -98,7 +108,10 @@ def fit_main_sequence(amplitude_deg: ArrayLike, peak_velocity_deg_s: ArrayLike, 
 
 def _finite(*columns: ArrayLike) -> list[Array]:
     """Columns of the saccades that have all their numbers, with an amplitude above 0."""
-    table = np.stack([np.asarray(column, float).ravel() for column in columns])
+    each = [np.asarray(column, float).ravel() for column in columns]
+    if len({len(column) for column in each}) > 1:
+        raise InputError(f"one number a saccade in each, got {', '.join(str(len(column)) for column in each)}")
+    table = np.stack(each)
     table = table[:, np.isfinite(table).all(axis=0) & (table[0] > 0)]
     if table.shape[1] < _LEAST:
         raise InputError(

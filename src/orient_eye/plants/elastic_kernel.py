@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from platformdirs import user_cache_path
+
+from orient_eye.resources import user_cache
 
 Array = NDArray[np.float64]
 STATIC_FRICTION = 0.006
@@ -412,7 +413,7 @@ def _still(eye: Eye, turn: Array, motor: Array, torque: Array, tension: Array) -
 
 def _cache_folder() -> Path | None:
     """Where compiled code is kept: the user's cache folder; None where that cannot be written."""
-    folder = user_cache_path("orient-eye") / "numba"
+    folder = user_cache("numba")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()

@@ -11,12 +11,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 from urllib.parse import quote
-
-from platformdirs import user_cache_path
 
 from orient_eye.checks import real, whole
 from orient_eye.errors import Ended, InputError
@@ -24,7 +22,7 @@ from orient_eye.files import write_atomically
 from orient_eye.recording import guard, web_page
 from orient_eye.recording.scene import TIMELINE
 from orient_eye.recording.web_page import LOCAL
-from orient_eye.resources import printable
+from orient_eye.resources import printable, user_cache
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -145,8 +143,7 @@ def _environment(quiet: bool) -> dict[str, str]:
     """Of a viewer that sends no usage statistics, and keeps what it keeps in our cache folder."""
     environment = {name: value for name, value in os.environ.items() if name != "FORCE_RERUN_ANALYTICS"}
     environment["CI"] = "1"  # the one variable that turns its usage statistics off, and it keeps no file of them
-    with suppress(RuntimeError):  # nobody's home
-        environment |= dict.fromkeys(["XDG_CACHE_HOME", "XDG_DATA_HOME"], str(user_cache_path("orient-eye") / "viewer"))
+    environment |= dict.fromkeys(["XDG_CACHE_HOME", "XDG_DATA_HOME"], str(user_cache("viewer")))
     if quiet:
         environment["RUST_LOG"] = "error"  # messages would stand in the picture
     return environment

@@ -9,7 +9,7 @@ import http.client
 import re
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 LOCAL = "127.0.0.1"
@@ -30,6 +30,10 @@ def served(behind: int, data: int) -> Iterator[int]:
 
     class Page(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
+            with suppress(OSError):  # the browser, or the viewer, has gone
+                self._pass_on()
+
+        def _pass_on(self) -> None:
             connection = http.client.HTTPConnection(LOCAL, behind, timeout=30)
             connection.request("GET", self.path, headers={"Accept-Encoding": "gzip"})
             answer = connection.getresponse()

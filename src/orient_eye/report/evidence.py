@@ -22,6 +22,7 @@ from orient_eye.learning.evaluation import Yardstick, evaluation_saccades
 from orient_eye.learning.figures.gaze import gaze_pictures
 from orient_eye.learning.figures.saccades import Saccades
 from orient_eye.learning.gaze_numbers import gaze_numbers
+from orient_eye.learning.policy import NAME as POLICY
 from orient_eye.learning.policy import Policy, shipped_policies
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.velocity_threshold import Bout, above
@@ -35,9 +36,9 @@ from orient_eye.task.saccade import SaccadeTask
 Array = NDArray[np.float64]
 COURSE = "metrics.csv"
 """How a training went, beside its policy."""
-_OF_COURSE = ("saccades", "reward_mean")
-STEPS_DEG, HELD_OUT_DEG = tuple(float(a) for a in range(1, 26)), (7.5, 12.5, 17.5)
-"""Amplitudes of the motor's steps, as `orient-eye sysid` takes them; those after them are not fitted."""
+_OF_COURSE = ("saccades", "reward_mean", "gap_mean")
+STEPS_DEG = tuple(float(a) for a in range(1, 26))
+"""Amplitudes of the motor's steps, as `orient-eye sysid` takes them."""
 MAIN_SEQUENCE_DEG = np.array([1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12.5, 15, 17.5, 20, 25, 30, 35, 40, 50, 60], float)
 """Amplitudes at which main sequences are told, as far as the targets go."""
 
@@ -148,8 +149,10 @@ class Evidence:
             self._add(run)
         self._judged: dict[str, Judged] = {}
 
-    def _add(self, run: Path) -> None:
-        policy = Policy.load(run)
+    def _add(self, named: Path) -> None:
+        policy = Policy.load(named)
+        run = shipped_policies().get(str(named), named)
+        run = run.parent if run.name == POLICY else run
         same = [name for name, other in self._policies.items() if _kind(other) == _kind(policy)]
         for name in same:
             del self._policies[name], self._folders[name]
@@ -191,7 +194,7 @@ class Evidence:
     def identification(self) -> Identification:
         """Of the MuJoCo eye by steps of its motor (thesis 3.3)."""
         self.progress("identifying the MuJoCo eye")
-        return identify_plant(make_plant("mujoco"), STEPS_DEG, HELD_OUT_DEG)
+        return identify_plant(make_plant("mujoco"), STEPS_DEG, ())
 
     @cached_property
     def studies(self) -> dict[str, Any]:

@@ -35,13 +35,14 @@ def _hiding(evidence: Evidence) -> Drawn:
             k0 = float(np.interp(_AT_DEG, run["size_deg"], run["k0"]))
             at_30.setdefault(run["kind"], []).append(k0)
         course.set(xlabel="saccades", ylabel="mean reward gap [%]", title=f"case {case}: while learning")
-        output.axhline(17.5, color="black", ls=":", lw=1)
+        output.axhline(17.5, color="black", ls=":", lw=1, label="w0 = 17.5 1/s")
         output.set(
             xlabel="saccade size [deg]", ylabel="k0 [1/s]", ylim=(5, 42), title=f"case {case}: k0 that it came to"
         )
         for axes in row:
             tidy(axes)
-    beside(figure, *figure.axes[0].get_legend_handles_labels())
+    (lines, labels), (more, others) = (axes.get_legend_handles_labels() for axes in figure.axes[:2])
+    beside(figure, [*lines, *more], [*labels, *others])
     told = "; ".join(f"{_KINDS[kind][1]}, {min(k0):.1f} to {max(k0):.1f}" for kind, k0 in at_30.items())
     return Drawn(figure, f"k0 that was learned for 30 deg, where 17.5 is best: {told}.")
 
@@ -113,8 +114,9 @@ EXHIBITS = {
         _CHAPTER,
         "k0 and D learned on the whole eye, beside w0 and K of its step responses",
         "The thesis expected k0 to follow w0 on a non-linear eye, and did not show it: the best k0 falls with "
-        "amplitude as w0 does. D follows K of large saccades; small ones end short of the target on purpose, as the "
-        "last tenths of a degree cost more energy than their accuracy is worth.",
+        "amplitude too, half as steeply, as a saccade around straight ahead goes only half as far from there as a "
+        "step of its size. Size / (D - F) stays near the K of small steps; small saccades end short of the target on "
+        "purpose, as the last tenths of a degree cost more energy than their accuracy is worth.",
         _amplitude,
     ),
     "transfer": Exhibit(

@@ -18,12 +18,12 @@ _OF_GAZE = {
     ),
     "components": (
         "Velocities of the horizontal and the vertical component of oblique saccades",
-        "Solid and dashed lines rise and fall together: the smaller component is stretched to the duration of the "
-        "larger one, as in people. Dotted, where shown: the same component alone.",
+        "Solid lines, horizontal and vertical, rise and fall together: the smaller component is stretched to the "
+        "duration of the larger one, as in people. Dashed: a saccade along that component alone.",
     ),
     "main_sequence": (
         "Main sequence of the gaze by direction, beside people",
-        "Vertical saccades are slower than horizontal ones, in people and here; here more so.",
+        "Vertical saccades are much slower than horizontal ones here; those of people hardly (Hopf et al. 2018).",
     ),
     "listing_plane": (
         "Listing's plane",
@@ -57,7 +57,10 @@ def _of_gaze(name: str, evidence: Evidence) -> Drawn:
         "torsion": f"Blips are {numbers['torsion_blip_median_deg']:.2f} deg in the median.",
         "reward_gap": f"The mean gap is {gap.mean():.1f} %, the 95th percentile {np.quantile(gap, 0.95):.1f} %.",
     }
-    return Drawn(judged.gaze_pictures[name], says[name])
+    figure = judged.gaze_pictures[name]
+    if figure.get_suptitle() == "":
+        figure.suptitle(judged.title)
+    return Drawn(figure, says[name])
 
 
 EXHIBITS = {
@@ -81,7 +84,9 @@ EXHIBITS = {
         )
     },
     **{
-        f"gaze-{name.removeprefix('gaze_').replace('_', '-')}": Exhibit(_GAZE, title, caption, partial(_of_gaze, name))
+        f"gaze-{name.removeprefix('gaze_').replace('_', '-')}": Exhibit(
+            _GAZE, f"{title}: tavares, case 1", caption, partial(_of_gaze, name)
+        )
         for name, (title, caption) in _OF_GAZE.items()
     },
 }

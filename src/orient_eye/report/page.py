@@ -116,7 +116,7 @@ def write_page(
 def _told(name: str, what: tuple[Exhibit, Drawn, bytes]) -> dict[str, Any]:
     exhibit, drawn, svg = what
     interactive = not isinstance(drawn.figure, Figure)
-    spec = Markup(json.dumps(drawn.figure.to_dict()).replace("</", "<\\/")) if interactive else None
+    spec = Markup(json.dumps(_spec(drawn)).replace("<", "\\u003c")) if interactive else None
     return {
         "id": name,
         "title": exhibit.title,
@@ -125,6 +125,11 @@ def _told(name: str, what: tuple[Exhibit, Drawn, bytes]) -> dict[str, Any]:
         "svg": base64.b64encode(svg).decode(),
         "spec": spec,
     }
+
+
+def _spec(drawn: Drawn) -> dict[str, Any]:
+    """Of an Altair chart, without the address of its schema."""
+    return {key: value for key, value in drawn.figure.to_dict().items() if key != "$schema"}
 
 
 def _script() -> Markup:

@@ -75,15 +75,13 @@ class Nearest:
                  "duration": np.abs(np.log(self.duration)) / np.log1p(NEAR_DURATION)}  # fmt: skip
         if self.off <= 1:
             return "nothing: near enough at every amplitude"
+        bound = next(number.high for number in self.task.actions.numbers if number.symbol == "B")
+        if np.isclose(self.action[:, 0], bound).any():
+            return "B at its bound"
         what = max(worst, key=lambda name: float(worst[name].max()))
         if what == "velocity" and self.peak_velocity[-1] > self.peak_velocity[0]:
             return "time costs in proportion, so that peak velocity does not level off (discount rate)"
-        bound = next(number.high for number in self.task.actions.numbers if number.symbol == "B")
-        return (
-            "B at its bound"
-            if np.isclose(self.action[:, 0], bound).any()
-            else "the pulse's tail: too long for its speed"
-        )
+        return "the pulse's tail: too long for its speed"
 
 
 def nearest(

@@ -10,7 +10,7 @@ the eye sees it, left on the left. Torsion and rotation vectors are those of `or
 
 from orient_eye.figures.gaze.components import component_velocities
 from orient_eye.figures.gaze.listing import listing_plane, torsion_over_time
-from orient_eye.figures.gaze.main_sequence import main_sequence, saturation
+from orient_eye.figures.gaze.main_sequence import main_sequence
 from orient_eye.figures.gaze.motors import motors_over_time
 from orient_eye.figures.gaze.paths import gaze_paths
 from orient_eye.figures.gaze.sequence import saccade_sequence
@@ -23,7 +23,6 @@ __all__ = [
     "main_sequence",
     "motors_over_time",
     "saccade_sequence",
-    "saturation",
     "torsion_maps",
     "torsion_over_time",
     "workspace",

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from orient_eye.figures import tidy
 from orient_eye.figures.gaze.human import draw_human, draw_human_duration
 from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL
+from orient_eye.movement.main_sequence import fit_peak_velocity
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.oblique import end_of_shift
 from orient_eye.movement.trajectory import Trajectory
@@ -20,22 +20,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _AXIAL_DEG = 15.0  # from an axis: nearer to it a saccade is no oblique one
 _LEAST = 3  # saccades through which a line is drawn
-
-
-def saturation(amplitude_deg: Array, peak_velocity_deg_s: Array) -> tuple[float, float]:
-    """V0 [deg/s] and c [deg] of peak velocity = V0 (1 - exp(-amplitude / c)), by least squares.
-
-    c is looked for up to 1000 times the largest amplitude, where the curve is a line; V0 follows from it.
-    """
-
-    def fit(log_c: float) -> tuple[float, float]:
-        shape = -np.expm1(-amplitude_deg / np.exp(log_c))
-        V0 = float(shape @ peak_velocity_deg_s / (shape @ shape))
-        return V0, float(((peak_velocity_deg_s - V0 * shape) ** 2).sum())
-
-    bounds = np.log([amplitude_deg.min() / 100, 1000 * amplitude_deg.max()])
-    log_c = minimize_scalar(lambda x: fit(x)[1], bounds=bounds, method="bounded", options={"xatol": 1e-9}).x
-    return fit(log_c)[0], float(np.exp(log_c))
 
 
 def main_sequence(trajectory: Trajectory, measures: Measures) -> Figure:
@@ -85,7 +69,7 @@ def main_sequence(trajectory: Trajectory, measures: Measures) -> Figure:
 def _draw_peak(axes: "Axes", some: Measures, name: str, style: dict[str, Any]) -> None:
     amplitude, peak = some.amplitude_deg, some.peak_velocity_deg_s
     if len(peak) >= _LEAST:
-        V0, c = saturation(amplitude, peak)
+        V0, c = fit_peak_velocity(amplitude, peak)
         reached = c < amplitude.max()
         told = f"$V_0$ = {V0:.0f} deg/s, c = {c:.1f} deg" if reached else f"{V0 / c:.1f} deg/s a deg, no saturation"
         size = np.linspace(0, amplitude.max(), 100)
