@@ -94,7 +94,7 @@ LINES: list[tuple[str, str]] = [
     ("train --updates 0 --plant lpf", "updates"),
     ("train --updates 1.5", "--updates"),
     ("train --batch-size 10000000000000", "batch size|batch_size"),
-    ("report --figures 9.9", "unknown exhibit '9.9'"),
+    ("report --figures 9.9", "unknown figure '9.9'"),
     ("report --pairs 0", "pairs must be a whole number"),
     ("report nosuch", "nosuch is no policy"),
     ("weights --like 500 5 20 2", "give --human too"),

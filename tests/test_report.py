@@ -98,7 +98,7 @@ def test_the_interactive_page_carries_its_script(evidence: Evidence, tmp_path: P
 
 
 def test_unknown_figures_and_runs_that_are_none_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(InputError, match=r"unknown exhibit '9\.9'"):
+    with pytest.raises(InputError, match=r"unknown figure '9\.9'"):
         chosen_figures(["9.9"])
     for arguments in (["--figures", "9.9"], [str(tmp_path / "none")], ["--figures", ""], ["--pairs", "0"]):
         with pytest.raises(SystemExit) as stop:
@@ -128,10 +128,18 @@ def test_a_policy_without_the_course_of_its_training_is_refused_where_that_is_sh
     assert not (tmp_path / "out" / "index.html").exists()
 
 
+def test_an_unfinished_run_is_told_so(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="the run is not finished; go on with it by orient-eye train --resume"):
+        Evidence([tmp_path])
+
+
 def test_a_run_stands_in_for_the_shipped_policy_of_its_kind(tmp_path: Path) -> None:
     run = tmp_path / "run"
     shutil.copytree(shipped_policies()["lpf-1"], run)
-    names = Evidence([run]).names()
+    evidence = Evidence([run], pairs=20)
+    names = evidence.names()
+    assert evidence.policy("lpf", "1").title == f"lpf, case 1 ({run})"
     assert str(run) in names
     assert "lpf-1" not in names
     assert len(names) == len(shipped_policies())

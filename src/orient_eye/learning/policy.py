@@ -257,6 +257,8 @@ class Policy:
                     f"it is of format 1 ({_OLD_NAME} and policy.npz), which orient-eye 0.1 wrote and this version does "
                     "not read; train it again, or use it with that version"
                 )
+            if os.path.exists(folder / "run.json"):
+                told = f"the run is not finished; go on with it by orient-eye train --resume {printable(folder)}"
             raise InputError(f"{printable(path)} is no policy: {told}")
         arrays, metadata = read_arrays(file, most=_LARGEST_BYTES, hint=hint)
         try:

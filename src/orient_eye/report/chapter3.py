@@ -40,7 +40,7 @@ EXHIBITS = {
     "3.6": Exhibit(
         _CHAPTER,
         "Step responses of the MuJoCo eye beside the surrogate's",
-        "The surrogate moves like the eye to within a fraction of a degree or a few, worst where w0 is far from the "
+        "The surrogate moves like the eye to within a fraction of a degree, worst where w0 is far from the "
         "mean one; what it misses is what a policy trained on it does not know.",
         _figure_3_6,
     ),

@@ -68,14 +68,15 @@ class Judged:
 
     @property
     def title(self) -> str:
-        """Plant and case in words."""
+        """Plant and case in words, and which run it is of where it is not shipped."""
         case, targets = self.policy.manifest.get("case"), self.task.targets.name
         words = [
             self.task.plant.name,
             *([f"case {case}"] if case else []),
             *([] if targets == "horizontal" else [targets]),
         ]
-        return ", ".join(words)
+        mine = "" if self.name in shipped_policies() else f" ({self.name})"
+        return ", ".join(words) + mine
 
     @property
     def course(self) -> Mapping[str, Array]:

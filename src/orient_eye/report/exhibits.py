@@ -5,7 +5,7 @@ from orient_eye.report import chapter2, chapter3, chapter4, chapter5, left_open,
 from orient_eye.report.exhibit import Exhibit
 
 EXHIBITS: Registry[Exhibit] = Registry(
-    "exhibit",
+    "figure",
     {
         **chapter2.EXHIBITS,
         **chapter3.EXHIBITS,
@@ -18,4 +18,4 @@ EXHIBITS: Registry[Exhibit] = Registry(
     Exhibit,
 )
 """Id to figure, the thesis' number where it has one; another package adds its own by the entry points
-`orient_eye.exhibits`."""
+`orient_eye.figures`."""

@@ -138,7 +138,7 @@ def _main_sequences(evidence: Evidence) -> Drawn:
     panels[0] = panels[0].add_params(chosen)
     chart = alt.vconcat(*panels).resolve_scale(shape="shared", color="shared")
     near = min(likenesses(evidence), key=lambda one: one.off)
-    return Drawn(chart, f"Nearest to people is {near.name}: {near.verdict}.")
+    return Drawn(chart, f"From 5 to 20 deg nearest to people is {near.name}: {near.verdict}.")
 
 
 def human_table(rows: list[dict[str, Any]]) -> list[Table]:
