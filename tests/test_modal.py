@@ -278,3 +278,10 @@ def test_files_that_are_no_modal_surrogate_are_refused(tmp_path: Path, content: 
 def test_impossible_modes_are_refused(numbers: dict[str, Any], told: str) -> None:
     with pytest.raises(InputError, match=told):
         Mode(**{"K": (1.0, 2.0), **numbers})
+
+
+def test_a_start_next_to_half_a_turn_fails_alone() -> None:
+    start = State(np.array([[7.458e-155, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]]), np.zeros((2, 3)))
+    moved = ModalPlant(FIRST).move(np.zeros((2, 5, 3)), start).trajectory()
+    assert moved.failed.tolist() == [True, False]
+    np.testing.assert_allclose(np.linalg.norm(moved.orientation[1], axis=-1), 1)

@@ -80,6 +80,8 @@ class ModalPlant(SimulatedPlant):
                 vector[own], speed[own] = forced[0] + free[0], forced[1] + free[1]
             orientation, velocity = as_orientation(vector), angular_velocity(vector, speed)
         diverged = ~(np.isfinite(orientation).all(axis=(1, 2)) & np.isfinite(velocity).all(axis=(1, 2)))
+        # Half a turn away there is no rotation vector: of a start next to it no unit quaternion is left.
+        diverged |= (np.abs((orientation**2).sum(axis=-1) - 1) > 1e-6).any(axis=1)
         return orientation, velocity, None, np.asarray(diverged)
 
     def rest(self, motor: Array) -> Array:
