@@ -280,7 +280,10 @@ def test_closed_form_and_samples_agree(data: st.DataObject) -> None:
     step_s, samples = 2e-4, 5000
     angle, speed = sampled_response(1.5, poles, response.dead_time, command.sample(step_s, samples)[..., 0], step_s)
     t = step_s * np.arange(samples)
-    np.testing.assert_allclose(angle, response.angle(t[None]), atol=5e-3)
+    # Between samples the command is a straight line: off by h^2/8 of its bend, times 2.2, the most that a damping of
+    # 0.3 makes of that (the integral of the absolute impulse response).
+    bend = np.abs(np.diff(command.rate(t)[0, :, 0])).max() / step_s
+    np.testing.assert_allclose(angle, response.angle(t[None]), rtol=0, atol=1.5 * 2.2 * step_s**2 / 8 * bend + 1e-9)
     sampled = measure_angle(t, angle, speed, response.final, "yaw", np.zeros(1, bool))
     assert sampled.overshoot[0] == pytest.approx(found.overshoot[0], abs=2e-2)
     assert sampled.peak_velocity_deg_s[0] == pytest.approx(found.peak_velocity_deg_s[0], rel=5e-2)
