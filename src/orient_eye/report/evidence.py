@@ -5,7 +5,7 @@ evidence = Evidence([Path("runs/mine")])         # a run instead of the shipped 
 evidence.policy("lpf", "2-varying").pairs        # its evaluation saccades, with the searched optimum
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -132,18 +132,15 @@ class Evidence:
         runs: run directories of `orient-eye train`, each in place of the shipped policy of the same plant, case and
             targets, or beside them.
         pairs: random saccades on which each policy is judged; None for as many as it was trained with.
-        progress: called with words for what is being computed.
 
     Raises:
         InputError: a run that is none, or is not finished; or pairs below 1.
     """
 
-    def __init__(
-        self, runs: Sequence[Path] = (), *, pairs: int | None = None, progress: Callable[[str], object] | None = None
-    ) -> None:
+    def __init__(self, runs: Sequence[Path] = (), *, pairs: int | None = None) -> None:
         if pairs is not None:
             whole("pairs", pairs, 1, 10**5)
-        self.pairs, self.progress = pairs, progress or (lambda words: None)
+        self.pairs = pairs
         self._policies = {name: Policy.load(folder) for name, folder in shipped_policies().items()}
         self._folders = dict(shipped_policies())
         for run in runs:
@@ -181,7 +178,6 @@ class Evidence:
     def judged(self, name: str) -> Judged:
         """A policy by its name, judged."""
         if name not in self._judged:
-            self.progress(f"judging {name}")
             policy, folder = self._policies[name], self._folders[name]
             task = policy.task()
             usual = policy.manifest.get("result", {}).get("pairs") or task.plant.evaluation_pairs
@@ -194,7 +190,6 @@ class Evidence:
     @cached_property
     def identification(self) -> Identification:
         """Of the MuJoCo eye by steps of its motor (thesis 3.3)."""
-        self.progress("identifying the MuJoCo eye")
         return identify_plant(make_plant("mujoco"), STEPS_DEG, ())
 
     @cached_property

@@ -12,10 +12,9 @@ from orient_eye.movement.main_sequence import MainSequence, fit_main_sequence
 from orient_eye.report.evidence import Evidence, Judged
 from orient_eye.report.exhibit import Drawn, Exhibit
 from orient_eye.report.page import Table
+from orient_eye.search.human_like import AT_DEG
 
 Array = NDArray[np.float64]
-AT_DEG = (5.0, 10.0, 20.0)
-"""Amplitudes at which ours are held against people's."""
 _CLOSE, _NEAR = 0.1, 0.25
 
 

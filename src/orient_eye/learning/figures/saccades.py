@@ -17,6 +17,7 @@ from orient_eye.learning.policy import Policy
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.oblique import seen_from, toward
 from orient_eye.movement.trajectory import Trajectory
+from orient_eye.movement.velocity_threshold import speed_of
 from orient_eye.state import State
 from orient_eye.task.saccade import Outcome, SaccadeTask
 from orient_eye.task.targets import saccades
@@ -108,7 +109,7 @@ def turned(trajectory: Trajectory) -> Array:
 
 def speed(trajectory: Trajectory) -> Array:
     """Angular speed [deg/s], (saccades, time)."""
-    return np.asarray(np.linalg.norm(trajectory.angular_velocity, axis=-1))
+    return speed_of(trajectory)
 
 
 def size_axis(axes: "Axes", task: SaccadeTask) -> None:
