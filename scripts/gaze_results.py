@@ -2,16 +2,18 @@
 
     python scripts/gaze_results.py runs/gaze                # what is done is kept
     python scripts/gaze_results.py runs/gaze --parts learn judge --seeds 0
+    python scripts/gaze_results.py runs/six --eye six --case smooth --parts learn judge    # of the six-motor eye
 
 Parts: `learn` (orient-eye train --plant tavares --targets gaze), `judge` (100 saccades from within 20 deg of straight
-ahead to within 30 deg, on MuJoCo, beside the optimum searched over the whole box of actions, and a sequence of 200),
-`surrogates` (policies learned on the linear and on the inertia-free eye, carried over as they are, but for the usual
-command, which is the eye's own, and after fine-tuning), `fick` (policies that begin at the torsion of Fick's gimbal, on
-both presets, with and without the weight of the force).
+ahead to within 30 deg, or 25 deg with six motors, on MuJoCo, beside the optimum searched over the whole box of actions,
+and a sequence of 200), `surrogates` (policies learned on the linear and on the inertia-free eye, carried over as they
+are, but for the usual command, which is the eye's own, and after fine-tuning), `fick` (policies that begin at the
+torsion of Fick's gimbal, on both presets, with and without the weight of the force).
 Every part prints its table; `result.json` in the folder has the numbers.
 """
 
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -52,6 +54,10 @@ class Results:
     """Where the runs go; those already there are not run again."""
     parts: tuple[Part, ...] = ("learn", "judge", "surrogates", "fick")
     """What is done."""
+    eye: str = "thesis"
+    """Of `learn` and `judge`."""
+    case: str = "1"
+    """The same."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Of the runs on the compiled eye."""
     updates: int | None = None
@@ -59,7 +65,8 @@ class Results:
     pairs: int = PAIRS
     """Saccades on which policies are judged."""
     ship: bool = False
-    """Copy the best policy of the compiled eye and that of the linear one into models/policies."""
+    """Copy the best policy of the compiled eye, and of the thesis' eye also that of the linear one, into
+    models/policies."""
 
 
 def main(options: Results) -> None:
@@ -77,7 +84,8 @@ def ship(options: Results) -> None:
     """Policies with the optimum of their evaluation saccades."""
     seeds = [options.folder / f"tavares-gaze-seed{seed}" for seed in options.seeds]
     best = min(seeds, key=lambda run: json.loads((run / "result.json").read_text())["gap_mean"])
-    for name, run in (("tavares-gaze", best), ("modal-gaze", options.folder / "modal-gaze")):
+    runs = {"tavares-gaze": best, "modal-gaze": options.folder / "modal-gaze"}
+    for name, run in (runs if options.eye == "thesis" else {f"{options.eye}-gaze": best}).items():
         policy = Policy.load(run)
         searched = evaluation_saccades(policy.task(), policy.manifest["result"]["pairs"])  # as the search is today
         pairs, rows = (each.bettered(policy.act) for each in searched)
@@ -85,6 +93,7 @@ def ship(options: Results) -> None:
         told = {**policy.manifest, "result": {**policy.manifest["result"], **found}}
         goal = replace(policy, manifest=told).save(ROOT / "models" / "policies" / name).parent
         carry_optimum(pairs, rows, goal)
+        shutil.copy(run / "metrics.csv", goal)
         print(f"{goal}: from {run.name}, gap {found['gap_mean']:.4f}", file=sys.stderr)
 
 
@@ -110,7 +119,8 @@ def learn(options: Results) -> list[dict[str, Any]]:
     """Policies of the compiled eye."""
     rows = []
     for seed in options.seeds:
-        out = train(options, f"tavares-gaze-seed{seed}", "--plant", "tavares", "--targets", "gaze", "--seed", str(seed))
+        told = ("--plant", "tavares", "--eye", options.eye, "--targets", "gaze", "--case", options.case)
+        out = train(options, f"tavares-gaze-seed{seed}", *told, "--seed", str(seed))
         result = json.loads((out / "result.json").read_text())
         seconds = json.loads((out / "seconds.json").read_text())
         rows.append({"seed": seed, "train_s": result["train_s"], "command_s": seconds, **gaps(result)})
@@ -123,15 +133,16 @@ def judge(options: Results) -> list[dict[str, Any]]:
     rows = []
     for seed in options.seeds:
         policy = Policy.load(options.folder / f"tavares-gaze-seed{seed}")
-        numbers = judged(policy, options.pairs)
-        rows.append({"seed": seed, **numbers, **in_sequence(policy, policy.task(make_plant("mujoco")))})
+        plant = make_plant("mujoco", eye=options.eye)
+        numbers = judged(policy, options.pairs, options.eye, options.case)
+        rows.append({"seed": seed, **numbers, **in_sequence(policy, policy.task(plant))})
         print(json.dumps(rows[-1], indent=1))
     return rows
 
 
-def judged(policy: Policy, pairs: int, eye: str = "thesis") -> dict[str, Any]:
+def judged(policy: Policy, pairs: int, eye: str = "thesis", case: str = "1") -> dict[str, Any]:
     """A policy on MuJoCo, beside the best actions of the eye's own task."""
-    own = SaccadeTask.of_case(make_plant("mujoco", eye=eye), "1", targets="gaze")
+    own = SaccadeTask.of_case(make_plant("mujoco", eye=eye), case, targets="gaze")
     near = GazeTargets(own.plant, limit_deg=START_DEG)
     random = np.random.default_rng(SEED)
     start, target = near.draw(pairs, random)[0], own.targets.draw(pairs, random)[1]

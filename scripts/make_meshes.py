@@ -2,17 +2,18 @@
 
     python scripts/make_meshes.py
 
-The meshes are for the eyes only: all physics stands in eye_mjcf/eye3.xml, from which this script
-takes every length, so that shell, arms and posts follow the numbers there. The same numbers give
-the same files.
+The meshes are for the eyes only: all physics stands in eye_mjcf/eye3.xml and eye6.xml, from which
+this script takes the places of all that a cable touches, so that shell, arms, eyelets and posts follow
+the numbers there. The same numbers give the same files. Meshes of the six-motor eye are called eye6_NAME.
 
-The eyeball of the prototype is a printed half sphere, so its mass, centre of mass and inertia
+The eyeball of the three-motor prototype is a printed half sphere, so its mass, centre of mass and inertia
 follow from its wall. They are printed beside those of the presets.
 """
 
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import mujoco
@@ -33,6 +34,8 @@ SECTIONS = 64  # of a surface of revolution about the line of sight
 RIM_X = -0.014  # m, where the shell ends: behind the insertions of every preset (eve_v3: -0.007)
 IRIS_DEG, LIMBUS_DEG, PUPIL_DEG = 27.0, 29.0, 11.0  # half angles seen from the centre, as in man
 PLATE_Z = -0.16  # m, top of the base plate: lower than the arms reach
+OPENING_DEG = 50.0  # half angle of the six-motor eye's opening behind, for its post and for the cable LR
+LEVEL_Z = -0.13  # m, top of the six-motor eye's base plate
 Z_TO_X = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 Y_TO_Z = np.array([[-1, 0, 0, 0], [0, 0, 1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 
@@ -111,11 +114,11 @@ def join(parts: list[Mesh]) -> Mesh:
 # --- The parts ----------------------------------------------------------------------------------
 
 
-def shell(radius: float, wall: float, rings: int = 15, sections: int = SECTIONS) -> Mesh:
-    """The printed eyeball: a hollow sphere of this outer radius, open behind x = `RIM_X`."""
+def shell(radius: float, wall: float, rings: int = 15, sections: int = SECTIONS, rim_x: float = RIM_X) -> Mesh:
+    """The printed eyeball: a hollow sphere of this outer radius, open behind x = `rim_x`."""
     inside = radius - wall
-    outer = arc(radius, 0, np.rad2deg(np.arccos(RIM_X / radius)), rings)
-    inner = arc(inside, np.rad2deg(np.arccos(RIM_X / inside)), 0, max(rings // 2, 2))
+    outer = arc(radius, 0, np.rad2deg(np.arccos(rim_x / radius)), rings)
+    inner = arc(inside, np.rad2deg(np.arccos(rim_x / inside)), 0, max(rings // 2, 2))
     return revolve(np.vstack([outer, inner]), sections)
 
 
@@ -129,6 +132,15 @@ def band(radius: float, inner_deg: float, outer_deg: float) -> Mesh:
     """Such a skin between two half angles."""
     top, bottom = arc(radius, inner_deg, outer_deg, 2), arc(radius - 0.0015, outer_deg, inner_deg, 2)
     return revolve(np.vstack([top, bottom, top[:1]]), 48)
+
+
+def front(radius: float) -> dict[str, Mesh]:
+    """What lies on the front of an eyeball of this radius."""
+    return {
+        "limbus": band(radius + 0.0005, IRIS_DEG - 0.5, LIMBUS_DEG),
+        "iris": cap(radius + 0.0006, IRIS_DEG),
+        "pupil": cap(radius + 0.0009, PUPIL_DEG, rings=3),
+    }
 
 
 def arm(half_length: float) -> Mesh:
@@ -192,9 +204,7 @@ def make_meshes(spec: mujoco.MjSpec, wall: float) -> dict[str, Mesh]:
     blocks, posts = motor_blocks(centres)
     return {
         "sclera": shell(radius, wall),
-        "limbus": band(radius + 0.0005, IRIS_DEG - 0.5, LIMBUS_DEG),
-        "iris": cap(radius + 0.0006, IRIS_DEG),
-        "pupil": cap(radius + 0.0009, PUPIL_DEG, rings=3),
+        **front(radius),
         "stem": rod([0.008, 0, 0], [radius - wall / 2, 0, 0], 0.007, 24),
         "arm_vertical": arm(float(spec.site("arm_motor1_upper").pos[2])).apply_transform(Y_TO_Z),
         "arm_horizontal": arm(float(spec.site("arm_motor2_left").pos[1])),
@@ -202,6 +212,99 @@ def make_meshes(spec: mujoco.MjSpec, wall: float) -> dict[str, Mesh]:
         "motors": blocks,
         "base": join([base_plate(centres, vias[0, 0]), posts]),
     }
+
+
+# --- The parts of the six-motor eye -------------------------------------------------------------
+
+
+def spindle(radius: float) -> Mesh:
+    """A drum about z of this radius, between two dished flanges, on its shaft."""
+    face = [[0.0095, 0], [0.0095, 0.005], [0.004, 0.007], [0.003, radius - 0.006], [0.0065, radius - 0.002]]
+    half = np.array([*face, [0.0065, radius + 0.0025], [0.005, radius + 0.0025], [0.005, radius]])
+    return revolve(np.vstack([half, half[::-1] * [-1, 1]]), 36).apply_transform(Z_TO_X.T)
+
+
+def bent_rod(points: Array, radius: float) -> Mesh:
+    """A rod through these points (points, 3), with a ball at each; straight parts share no corner, so all is closed."""
+    parts = [trimesh.creation.icosphere(subdivisions=1, radius=1.05 * radius).apply_translation(p) for p in points]
+    for start, end in pairwise(points):
+        gap = 0.2 * radius * (end - start) / np.linalg.norm(end - start)
+        parts.append(rod(start + gap, end - gap, radius, 16))
+    return join(parts)
+
+
+def six_motor_blocks(eyelets: Array, spindles: Array) -> Mesh:
+    """Motor housings on the axes of the spindles, (motors, 3) both: behind the eye in a whirl, else on the left."""
+    blocks = []
+    for eyelet, centre in zip(eyelets, spindles, strict=True):
+        across = np.cross((centre - eyelet) * [0, 1, 1], [1, 0, 0])
+        axis, deep = np.rint(across / np.linalg.norm(across)), [2, 1, 1]
+        if eyelet[0] > 0:
+            axis, deep = abs(axis), [1, 1, 1]
+        half = 0.015 * (1 - abs(axis))
+        blocks.append(box(centre + 0.009 * axis + half, centre + 0.039 * axis - half * deep))
+    return join(blocks)
+
+
+def standing_plate(low: Iterable[float], high: Iterable[float], top: float) -> Mesh:
+    """A plate on the six-motor eye's base, rounded above, between its lowest and highest (x, y), facing forward."""
+    (back, right), (front, left) = low, high
+    corners = np.array([[y, z] for y in (right + 0.008, left - 0.008) for z in (LEVEL_Z + 0.003, top - 0.008)])
+    mesh = plate(hull_of_circles(corners, np.full(4, 0.008), 32), front - back).apply_transform(Z_TO_X)
+    return mesh.apply_translation([(back + front) / 2, 0, 0])
+
+
+def frame(eyelets: Array, spindles: Array) -> Mesh:
+    """What carries eyelets and spindles, (motors, 3) both, and the eye.
+
+    The plate with the eyelets of the recti stands on the base. From it two beams, on the left of the spindles, reach
+    forward above and below the eye, to the eyelets of the obliques. A bent post holds the ball joint.
+    """
+    oblique = eyelets[:, 0] > 0
+    x, y, _ = eyelets[~oblique].mean(axis=0)
+    beam_y, top = spindles[oblique, 1].max() + 0.0125, spindles[:, 2].max()
+    parts = [standing_plate([x - 0.006, y - 0.024], [x - 0.001, y + 0.024], top + 0.008)]
+    for (tip_x, tip_y, tip_z), (_, _, z) in zip(eyelets[oblique], spindles[oblique], strict=True):
+        parts.append(box([x - 0.003, beam_y - 0.003, z - 0.006], [tip_x + 0.006, beam_y + 0.003, z + 0.006]))
+        ring_z = tip_z + np.sign(z) * 0.0035
+        parts.append(bent_rod(np.array([[tip_x, beam_y, z], [tip_x, tip_y, z], [tip_x, tip_y, ring_z]]), 0.003))
+    knee = 0.072 * np.array([-1, 0, -np.tan(np.deg2rad(20))])
+    parts.append(bent_rod(np.array([[0, 0, 0], knee, [knee[0], 0, LEVEL_Z]]), 0.0035))
+    parts.append(trimesh.creation.icosphere(subdivisions=2, radius=0.007))
+    return join(parts)
+
+
+def six_motor_base(spindles: Array) -> Mesh:
+    """The plate under all, and the one behind the spindles (motors, 3) that carries the motors of the recti."""
+    behind = spindles[spindles[:, 0] < spindles[:, 0].mean()]
+    (x, right, _), (_, left, top) = behind.min(axis=0) - 0.015, behind.max(axis=0) + 0.015
+    corners = np.array([[x, y] for x in (x - 0.015, -0.02) for y in (right, left)])
+    floor = plate(hull_of_circles(corners, np.full(4, 0.015), 32), 0.006).apply_translation([0, 0, LEVEL_Z - 0.003])
+    return join([floor, standing_plate([x - 0.021, right], [x - 0.015, left], top)])
+
+
+def make_six_motor_meshes(spec: mujoco.MjSpec) -> dict[str, Mesh]:
+    """File name (without .stl) to mesh, for the six-motor eye: tendon NAME runs from head_NAME to eye_NAME."""
+    names = [motor.name for motor in spec.actuators]
+    eyelets, spindles = (
+        np.array([part.pos for part in parts])
+        for parts in ([spec.site(f"head_{n}") for n in names], [spec.geom(f"spindle_{n}") for n in names])
+    )
+    radius = float(np.mean([np.linalg.norm(spec.site(f"eye_{n}").pos) for n in names]))
+    thickness, motor = radius / 20, spec.actuators[0]
+    touches = np.column_stack([spindles[:, 0], eyelets[:, 1:]])
+    parts = {
+        "sclera": shell(radius, thickness, sections=48, rim_x=-radius * np.cos(np.deg2rad(OPENING_DEG))),
+        **front(radius),
+        "stem": rod([0.005, 0, 0], [radius - thickness / 2, 0, 0], 0.004),
+        "spindle": spindle(motor.gainprm[0] / motor.biasprm[1]),
+        "eyelets": join([ring(eyelet, 0.003, 0.0012) for eyelet in eyelets]),
+        "leads": join([rod(a, b, 0.0006, 8) for a, b in zip(eyelets, touches, strict=True)]),
+        "motors": six_motor_blocks(eyelets, spindles),
+        "frame": frame(eyelets, spindles),
+        "base": six_motor_base(spindles),
+    }
+    return {f"eye6_{name}": mesh for name, mesh in parts.items()}
 
 
 # --- The scales ---------------------------------------------------------------------------------
@@ -277,13 +380,15 @@ def main(options: Options) -> None:
         sys.exit(f"the wall must be between 0.0005 and {radius / 2:.4f} m and the density positive")
     folder = options.out or data_folder("eye_mjcf") / "meshes"
     meshes = make_meshes(spec, options.wall)
+    meshes |= make_six_motor_meshes(load_spec(str(data_folder("eye_mjcf") / "eye6.xml")))
     for name, mesh in meshes.items():
         write_atomically(folder / f"{name}.stl", mesh.export)
     size = sum(path.stat().st_size for path in folder.glob("*.stl"))
     print(f"{len(meshes)} meshes in {folder}, {size / 1e3:.0f} kB\n")
 
     printed = weigh_shell(radius, options.wall, options.density)
-    print(report(printed, {name: published(load_spec(name)) for name in EYES}, options.wall, options.density))
+    presets = [name for name in EYES if EYES[name].file == EYES["thesis"].file]
+    print(report(printed, {name: published(load_spec(name)) for name in presets}, options.wall, options.density))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,9 @@ from typing import Any
 
 import pytest
 
+if "PYTEST_XDIST_WORKER" in os.environ:  # a worker has one core: threads of two workers wait for each other
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 _HARD = ("tests/test_fuzz_", "tests/test_faults_", "tests/test_checkpoint")
 
 
@@ -16,6 +19,18 @@ def private_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture
+def plain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trainings without pictures and recording, which take longer than a tiny training."""
+    without_pictures(monkeypatch)
+
+
+def without_pictures(patch: pytest.MonkeyPatch) -> None:
+    """For a fixture of a module's own."""
+    for what in ("figures.draw_learning", "figures.draw_policy", "stages.record_stages"):
+        patch.setattr(f"orient_eye.learning.{what}", lambda *_: None)
 
 
 @pytest.fixture

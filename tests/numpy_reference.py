@@ -1,4 +1,4 @@
-"""The thesis' simulator (its Algorithm 2) in plain NumPy and scipy: the witness of the compiled plant `tavares`.
+"""The simulators of the thesis (its Algorithm 2) and of the cable eye in plain NumPy: the witness of plant `tavares`.
 
 Written from the thesis' equations 3.1 to 3.12, a batch at a time; it shares only the numbers of `Elastics` with the
 kernel. The constants of static friction are written a second time here.
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NumpyReference:
-    """An eye that hinges turn.
+    """An eye that hinges or spindles turn.
 
     Attributes:
         elastics: of the eye.
         gravity: add the gravity torque (thesis 3.8).
-        as_published: the author's program to the letter; see `orient_eye.plants.tavares.TavaresPlant`.
+        as_published: the authors' programs to the letter; see `orient_eye.plants.tavares.TavaresPlant`.
         step_s: of the integration.
     """
 
@@ -46,11 +46,12 @@ class NumpyReference:
         arm = Rotation.from_rotvec((angle[..., None] * e.arm_axis).reshape(-1, 3)).as_matrix()
         arm = arm.reshape(*angle.shape, 3, 3)
         end = np.einsum("ntij,tj->nti", arm[:, e.motor], e.arm_end) + e.arm_centre[e.motor]
+        end = np.where(e.wound[:, None] != 0, e.via, end)  # a spindle's cable is wound up behind its head point
         insertion = np.einsum("nij,tj->nti", turn, e.insertion)
         pulled_to = np.where(np.isnan(e.via), end, e.via)
         span = pulled_to - insertion
         distance = np.linalg.norm(span, axis=-1)
-        length = distance + np.linalg.norm(end - pulled_to, axis=-1)
+        length = distance + np.linalg.norm(end - pulled_to, axis=-1) + e.wound * angle[:, e.motor]
         tension = e.stiffness * np.maximum(length - e.rest_length, 0)
         force = (tension / distance)[..., None] * span
         return np.cross(insertion, force).sum(axis=1), tension
@@ -78,7 +79,7 @@ class NumpyReference:
     def _advance(self, turn: Array, q: Array, omega: Array, torque: Array) -> tuple[Array, Array]:
         """One step of Algorithm 2: omega first, then q with the new omega."""
         omega = omega + self.step_s * self.acceleration(turn, omega, torque)
-        if not self.as_published:
+        if self.elastics.wound.any() or not self.as_published:
             return (Rotation.from_rotvec(self.step_s * omega) * rotation(q)).as_quat(scalar_first=True), omega
         q = q + self.step_s * rate(q, omega)
         return q / np.linalg.norm(q, axis=-1, keepdims=True), omega
@@ -87,7 +88,11 @@ class NumpyReference:
         """Angular acceleration [rad/s^2] (n, 3), head frame; 3.9 to 3.11."""
         turned_back = np.swapaxes(turn, -1, -2)
         resisted = torque - self.elastics.friction * omega
-        if self.as_published:
+        if self.as_published and self.elastics.wound.any():
+            still = np.linalg.norm(omega, axis=-1) < 0.01
+            weak = np.linalg.norm(resisted, axis=-1) < 0.005
+            resisted = np.where((still & weak)[:, None], 0, resisted)
+        if self.as_published and not self.elastics.wound.any():
             inertia = turned_back @ self.elastics.inertia @ turn
             still = np.linalg.norm(omega, axis=-1) < 1e-5
             weak = np.linalg.norm(torque, axis=-1) < 0.006

@@ -19,6 +19,14 @@ from orient_eye.task.cases import Case
 from orient_eye.task.solved_weights import ChosenSaccade, Steps
 
 RANDOM = np.random.default_rng(0)
+_ALL_SIX = "t_s,IR_deg,MR_deg,SR_deg,LR_deg,IO_deg,SO_deg\n"
+SIX = {
+    "six.csv": "t_s,MR_deg\n0,56.2\n0.3,60\n",
+    "six_slack.csv": f"{_ALL_SIX}0,0,0,0,0,0,0\n0.3,57,57,57,57,57,57\n",
+    "six_away.csv": f"{_ALL_SIX}0,200,200,200,200,200,200\n0.3,57,57,57,57,57,57\n",
+    "six_far.csv": "t_s,MR_deg\n0,56.2\n0.3,400\n",
+    "six_loose.csv": "t_s,MR_deg\n0,56.2\n0,-60\n0.3,56.2\n",
+}
 NAN, INF, HUGE = float("nan"), float("inf"), 10**400
 LINES: list[tuple[str, str]] = [
     # what a command is
@@ -54,6 +62,18 @@ LINES: list[tuple[str, str]] = [
     ("simulate --motor command.csv --plant lpf --surrogate command.csv", "command.csv"),
     ("simulate --motor command.csv --plant lpf --out folder", "folder exists and is not an empty folder"),
     ("simulate --motor command.csv --plant lpf --out command.csv/out", "command.csv/out"),
+    ("simulate --motor command.csv --eye six", "cannot be commanded by tau2_deg; its columns are t_s, IR_deg, MR_deg"),
+    ("simulate --motor six_slack.csv --eye six",
+     "six_slack.csv, first row: slack cables do not hold the eye: IR, MR, SR, LR, IO, SO; .* at ease .* IR 57.8, MR"),
+    ("simulate --motor six_away.csv --eye six --plant tavares",
+     "six_away.csv, first row: the eye would not stay near straight ahead, it turns away by .* deg; wind .* less"),
+    ("simulate --motor six_far.csv --eye six", "sends MR to .* mechanical range is -57 to 344 deg"),
+    ("simulate --motor six_loose.csv --eye six", "sends MR to -60.0 deg .* mechanical range is -57 to 344 deg"),
+    ("simulate --motor six.csv", "cannot be commanded by MR_deg; its columns are t_s, tau1_deg, tau2_deg, tau3_deg"),
+    ("simulate --motor six.csv --eye six --pretension 3", "the eye has no pretension 3: choose one of 1, 2"),
+    ("simulate --motor six.csv --eye six --pretension nan", "pretension must be a number, got nan; choose one of 1, 2"),
+    ("simulate --motor command.csv --pretension 1", "no pretension 1: its motors rest at 0; leave the pretension out"),
+    ("simulate --motor command.csv --plant lpf --pretension 1", "--pretension does nothing on plant 'lpf'"),
     # sysid
     ("sysid --plant lpf --amplitudes", "no step amplitude given; name at least one"),
     ("sysid --plant lpf --amplitudes 0", "a step of 0 deg shows nothing"),
@@ -70,7 +90,7 @@ LINES: list[tuple[str, str]] = [
     ("sysid --plant lpf --until 1", "--until is for recordings"),
     ("sysid --plant lpf --seed 1", "--seed is for --all-motors"),
     ("sysid --plant lpf --frozen stiffness", "--frozen is for --physical"),
-    ("sysid --plant lpf --all-motors", "--all-motors needs three motors and three axes"),
+    ("sysid --plant lpf --all-motors", "--all-motors needs three motors or more and three axes"),
     ("sysid --plant tavares --all-motors --seed -1", "--seed must be a whole number of at least 0, got -1"),
     ("sysid --plant tavares --all-motors --seed 1.5", "--seed"),
     ("sysid --plant tavares --all-motors --amplitudes 5", "--amplitudes says nothing to --all-motors"),
@@ -211,8 +231,11 @@ LINES: list[tuple[str, str]] = [
 
 @pytest.fixture(scope="module")
 def pool(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of files, good and bad."""
-    return write_pool(tmp_path_factory.mktemp("pool"))
+    """A folder of files, good and bad; those called six are of the eye of that name."""
+    folder = write_pool(tmp_path_factory.mktemp("pool"))
+    for name, rows in SIX.items():
+        (folder / name).write_text(rows)
+    return folder
 
 
 @pytest.mark.parametrize(("line", "message"), LINES, ids=[line for line, _ in LINES])
@@ -262,6 +285,9 @@ CALLS: list[tuple[str, Callable[[], Any], str]] = [
     ("plant", lambda: oe.make_plant("nosuch"), "unknown plant 'nosuch'"),
     ("option", lambda: oe.make_plant("lpf", eye="thesis"), "its options are"),
     ("threads", lambda: oe.make_plant("mujoco", threads=1.5), "threads"),
+    ("pretension", lambda: oe.make_plant("mujoco", eye="six", pretension="1"), "pretension must be a number, got '1'"),
+    ("pretension", lambda: oe.make_plant("tavares", eye="six", pretension=HUGE), "pretension must be a number"),
+    ("pretension", lambda: oe.make_plant("tavares", eye="six", pretension=1.5), "no pretension 1.5: choose one"),
     ("K", lambda: oe.Surrogate(NAN, 17.5), "K"),
     ("K", lambda: oe.Surrogate(HUGE, 17.5), "K"),
     ("K", lambda: oe.Surrogate(True, 17.5), "K"),
@@ -323,7 +349,7 @@ CALLS: list[tuple[str, Callable[[], Any], str]] = [
     ("steps", lambda: oe.identify_plant(lpf(), [HUGE]), "amplitude of a step"),
     ("model", lambda: oe.identify_plant(lpf(), [5.0], model="nosuch"), "a model is best"),
     ("recordings", lambda: oe.identify_recordings([]), "no recording to identify"),
-    ("modes", lambda: oe.identify_modes(lpf(), RANDOM), "three motors and three axes"),
+    ("modes", lambda: oe.identify_modes(lpf(), RANDOM), "three motors or more and three axes"),
     ("modes", lambda: oe.identify_modes(lpf(), RANDOM, fitted=10**12), "pulse-steps fitted .* got 1000000000000"),
     ("modes", lambda: oe.identify_modes(lpf(), RANDOM, worth=NAN), "is worth .* got nan"),
     ("modes", lambda: oe.identify_modes(lpf(), RANDOM, order="third"), "an order is best"),

@@ -20,6 +20,7 @@ import safetensors.numpy
 import torch
 
 import faulting
+from conftest import without_pictures
 from orient_eye import cli
 from orient_eye.errors import InputError
 from orient_eye.files import digest
@@ -47,8 +48,7 @@ def _middle(task: SaccadeTask, start: State, target: np.ndarray, *_: Any, **__: 
 def _shorten(patch: pytest.MonkeyPatch) -> None:
     """Search and pictures are most of the work of a tiny training, and not what is tried here."""
     patch.setattr("orient_eye.search.optimum_cache.find_optimum", _middle)
-    for what in ("figures.draw_learning", "figures.draw_policy", "stages.record_stages"):
-        patch.setattr(f"orient_eye.learning.{what}", lambda *_: None)
+    without_pictures(patch)
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -28,8 +28,10 @@ from orient_eye.cli.train import Train
 from orient_eye.cli.view import View
 from orient_eye.errors import Ended, InputError
 from orient_eye.learning.config import TrainConfig
-from orient_eye.plants import PLANTS, Option, PlantKind
+from orient_eye.motor import rests
+from orient_eye.plants import PLANTS, Option, PlantKind, make_plant
 from orient_eye.registry import load
+from orient_eye.rotations import to_euler
 from orient_eye.task.cases import CASES
 
 SHARED = [
@@ -277,6 +279,41 @@ def test_simulate_on_other_plants(plant: str, tmp_path: Path) -> None:
     done = run("simulate", "--plant", plant, "--motor", command_file(tmp_path), "--out", tmp_path / "run", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["final_yaw_pitch_roll_deg"][0] == pytest.approx(11.7, abs=0.3)
+
+
+@pytest.mark.parametrize(("pretension", "yaw"), [(1, -4.2), (2, -10.0)])
+def test_simulate_the_six_motor_eye(pretension: int, yaw: float, tmp_path: Path) -> None:
+    """A motor without a column stands at its pretension, and the eye begins where the first row holds it."""
+    told = make_plant("tavares", eye="six", pretension=pretension).motors
+    motor = {each.name: each.rest for each in told}
+    file, ends = tmp_path / "spindles.csv", motor["LR"] + 10
+    file.write_text(f"t_s,LR_deg\n0,{ends}\n0.02,{ends}\n0.1,{motor['LR']}\n")
+    words = f"--eye six --pretension {pretension} --motor {file} --out {tmp_path / 'run'}"
+    parse(Simulate, words.split()).run()
+    with np.load(tmp_path / "run" / "trajectory.npz") as found:
+        begins, moved = to_euler(found["orientation"][0, 0]), found["motor"][0]
+        speed = np.linalg.norm(found["angular_velocity"][0, :20], axis=1)
+    assert begins[0] == pytest.approx(yaw, abs=0.05)
+    assert speed.max() < 1e-6
+    np.testing.assert_allclose(np.ptp(moved, axis=0), [0, 0, 0, 10, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(moved[-1], list(motor.values()), atol=1e-9)
+    header = (tmp_path / "run" / "trajectory.csv").read_text().splitlines()[0]
+    assert "IR_deg,MR_deg,SR_deg,LR_deg,IO_deg,SO_deg,command_IR_deg" in header
+
+
+@pytest.mark.parametrize(("unit", "pretension"), [("rad", 1), ("rad", 2), ("deg", 1)])
+def test_spindle_angles_in_radians_are_asked_about(
+    unit: str, pretension: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Those of a small movement in degrees are not."""
+    motors = make_plant("tavares", eye="six", pretension=pretension).motors
+    rest = rests(motors) if unit == "deg" else np.deg2rad(rests(motors))
+    moved = rest + 0.3 * (np.eye(6)[1] - np.eye(6)[3])
+    rows = ("t_s", *(each.column for each in motors)), (0, *rest), (0.1, *moved)
+    file = tmp_path / "spindles.csv"
+    file.write_text("\n".join(",".join(map(str, row)) for row in rows))
+    Simulate(file, "tavares", {"eye": "six", "pretension": pretension}, out=tmp_path / "run").run()
+    assert ("are these radians?" in capsys.readouterr().err) == (unit == "rad")
 
 
 def test_simulate_holds_the_last_row_up_to_the_horizon(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ import orient_eye
 from numpy_reference import NumpyReference, rate
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
+from orient_eye.motor import ranges, rests
 from orient_eye.plants import make_plant
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.plants.simulated import Run
@@ -29,16 +30,26 @@ from orient_eye.rotations import FORWARD, angle_between, rotation
 from orient_eye.state import State
 
 Array = NDArray[np.float64]
-FORMS: list[dict[str, Any]] = [{}, {"accurate": True}, {"as_published": True}, {"gravity": True, "eye": "eve_v3"}]
+SIX: dict[str, Any] = {"eye": "six"}
+FORMS: list[dict[str, Any]] = [
+    {},
+    {"accurate": True},
+    {"as_published": True},
+    {"gravity": True, "eye": "eve_v3"},
+    {**SIX, "pretension": 2.0},
+    {**SIX, "accurate": True},
+    {**SIX, "as_published": True},
+]
 
 
-def saccades(count: int, samples: int = 301, seed: int = 0) -> Array:
-    """Pulse-steps of all three motors, inside their range; some let elastics go slack."""
-    rng, shape = np.random.default_rng(seed), (count, 3)
+def saccades(count: int, samples: int = 301, seed: int = 0, plant: TavaresPlant | None = None) -> Array:
+    """Pulse-steps of all motors, of the thesis' eye unless told; inside their range; some let elastics go slack."""
+    motors = (plant or TavaresPlant()).motors
+    rng, shape = np.random.default_rng(seed), (count, len(motors))
     pulse = PulseStep(
         rng.uniform(-20, 20, shape), rng.uniform(25, 70, shape), rng.uniform(-30, 30, shape), rng.uniform(8, 25, shape)
     )
-    return np.clip(pulse.sample(0.001, samples), -80, 80)
+    return np.clip(rests(motors) + pulse.sample(0.001, samples), *ranges(motors).T)
 
 
 def anywhere(motor: Array, seed: int = 1) -> State:
@@ -57,11 +68,11 @@ def identical(one: Run, other: Run) -> None:
 # --- right ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("eye", ["thesis", "eve_v3"])
+@pytest.mark.parametrize("eye", ["thesis", "eve_v3", "six"])
 @pytest.mark.parametrize("options", [{}, {"gravity": True}, {"as_published": True}], ids=str)
 def test_the_kernel_is_the_thesis_equations(eye: str, options: dict[str, bool]) -> None:
     plant = TavaresPlant(eye, **options)
-    motor = saccades(12)
+    motor = saccades(12, plant=plant)
     q, omega, tension, diverged = plant.run(motor, anywhere(motor))
     reference = NumpyReference(plant.elastics, **options)
     expected_q, expected_omega, expected_tension, _ = reference.run(motor, anywhere(motor))
@@ -71,7 +82,7 @@ def test_the_kernel_is_the_thesis_equations(eye: str, options: dict[str, bool]) 
     assert tension is not None
     np.testing.assert_allclose(tension, expected_tension, rtol=0, atol=1e-11)
     assert (tension == 0).any()  # slack ones are among them
-    assert np.abs(omega).max() > 300
+    assert np.abs(omega).max() > 250
 
 
 def test_what_is_asked_of_the_witness_can_be_missed() -> None:
@@ -97,9 +108,10 @@ def test_fast_turns_are_exact_rotations() -> None:
     np.testing.assert_allclose(omega, expected[1], rtol=1e-11, atol=1e-8)
 
 
-@pytest.mark.parametrize("options", [{}, {"gravity": True}, {"eye": "eve_v3", "gravity": True}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"gravity": True}, {"eye": "eve_v3", "gravity": True}, SIX], ids=str)
 def test_torque_is_the_witness(options: dict[str, Any]) -> None:
-    plant, motor = TavaresPlant(**options), saccades(40)[:, 0]
+    plant = TavaresPlant(**options)
+    motor = saccades(40, plant=plant)[:, 0]
     reference = NumpyReference(plant.elastics, gravity=options.get("gravity", False))
     at = anywhere(motor[:, None]).orientation
     np.testing.assert_allclose(plant.torque(at, motor), reference.torque(at, motor), rtol=0, atol=1e-14)
@@ -285,7 +297,7 @@ def test_accurate_and_published_exclude_each_other() -> None:
 
 @pytest.mark.parametrize("options", FORMS, ids=str)
 def test_bit_for_bit_at_any_number_of_threads(options: dict[str, Any]) -> None:
-    motor = saccades(67)
+    motor = saccades(67, plant=TavaresPlant(**options))
     start = anywhere(motor)
     one = TavaresPlant(threads=1, **options).run(motor, start)
     for threads in (2, 3, 5, 0):
@@ -330,10 +342,11 @@ def moved_in_a_child(plant: TavaresPlant, motor: Array, answer: Connection) -> N
     answer.send((plant.run(motor, anywhere(motor)), plant.rest(motor[:3, 0])))
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-def test_in_a_forked_child(threads: int) -> None:
+@pytest.mark.parametrize("options", [{"threads": 1}, {"threads": 3}, {"threads": 3, "eye": "six"}], ids=str)
+def test_in_a_forked_child(options: dict[str, Any]) -> None:
     """After it was used here, and while it is."""
-    plant, motor = TavaresPlant(threads=threads), saccades(40)
+    plant = TavaresPlant(**options)
+    motor = saccades(40, plant=plant)
     before = plant.run(motor, anywhere(motor))
     fork = multiprocessing.get_context("fork")
     here, there = fork.Pipe(duplex=False)
@@ -357,7 +370,8 @@ def test_in_a_forked_child(threads: int) -> None:
 
 @pytest.mark.parametrize("options", [*FORMS, {"threads": 3, "rig": "prototype"}], ids=str)
 def test_pickles(options: dict[str, Any]) -> None:
-    plant, motor = TavaresPlant(**options), saccades(3, 40)
+    plant = TavaresPlant(**options)
+    motor = saccades(3, 40, plant=plant)
     other = pickle.loads(pickle.dumps(plant))
     assert other.identity() == plant.identity()
     assert other.threads == plant.threads

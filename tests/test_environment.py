@@ -592,12 +592,12 @@ def draws() -> None:
 @pytest.mark.usefixtures("draws")
 def test_frames_of_the_whole_movement(plant: str, tmp_path: Any) -> None:
     """An episode is one step, so its frames are the movement's, from the start to its end, evenly in time."""
-    env = SaccadeEnv(plant, render_mode="rgb_array_list", horizon_s=0.3)
+    env = SaccadeEnv(plant, render_mode="rgb_array_list", horizon_s=0.1)
     env.reset(options={"start_yaw_deg": 20.0, "target_yaw_deg": -20.0})
     (before,) = env.render()
     env.step(env.task.actions.to_unit(np.array([[40.0, env.task.actions.likely(from_yaw([-20.0]))[0, 1], 17.0]]))[0])
     shown = env.render()
-    assert len(shown) == 91  # 0.3 s, ten times slower, at 30 a second
+    assert len(shown) == 31  # 0.1 s, ten times slower, at 30 a second
     assert all(picture.shape == before.shape == (360, 480, 3) for picture in shown)
     np.testing.assert_array_equal(shown[0], before)
     assert (shown[0] != shown[-1]).any(axis=2).mean() > 0.02
@@ -610,16 +610,16 @@ def test_frames_of_the_whole_movement(plant: str, tmp_path: Any) -> None:
 
 @pytest.mark.usefixtures("draws", "warnings_are_errors")
 def test_one_picture() -> None:
-    env = gymnasium.make(ID, plant="mujoco", render_mode="rgb_array")
+    env = gymnasium.make(ID, plant="mujoco", render_mode="rgb_array", horizon_s=0.1)
     check_env(env.unwrapped)
     env.reset(seed=0)
     before = env.render()
     env.step(env.action_space.sample())
     assert (before != env.render()).any()
-    envs = SaccadeVectorEnv(2, render_mode="rgb_array_list")
+    envs = SaccadeVectorEnv(2, render_mode="rgb_array_list", horizon_s=0.1)
     envs.reset(seed=0)
     envs.step(envs.action_space.sample())
-    assert [len(each) for each in envs.render()] == [151, 151]
+    assert [len(each) for each in envs.render()] == [31, 31]
 
 
 def test_human_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 import importlib.util
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -16,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from orient_eye.errors import InputError
 from orient_eye.eyes import EYES
 from orient_eye.eyes.elastics import Elastics
-from orient_eye.eyes.model import STANDARD_GRAVITY, ball, build_model, model_hash, motors, tendon_tension
+from orient_eye.eyes.model import STANDARD_GRAVITY, Tendons, ball, build_model, model_hash, motors
 from orient_eye.motor import names, ranges
 from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.mujoco import MujocoPlant
@@ -54,20 +55,32 @@ INERTIA = {
 
 
 def pose(model: mujoco.MjModel, seed: int = 0) -> mujoco.MjData:
-    """The eye turned and turning, the arms turned, all by chance."""
+    """The eye turned and turning, arms and spindles turned, all by chance."""
     rng = np.random.default_rng(seed)
     data = mujoco.MjData(model)
     data.joint("eye").qpos = Rotation.random(rng=rng).as_quat(scalar_first=True)
     data.joint("eye").qvel = rng.normal(size=3)
     for joint in arms(model):
         data.joint(joint).qpos = rng.uniform(-0.5, 0.5)
+    for spindle in spindles(model):
+        data.actuator(spindle).ctrl = rng.uniform(0.5, 1.5)
     mujoco.mj_forward(model, data)
     return data
 
 
+def turning(model: mujoco.MjModel, what: mujoco.mjtTrn) -> list[str]:
+    """Motors that turn joints, or tendons."""
+    return [name for name in names(motors(model)) if model.actuator(name).trntype[0] == what]
+
+
 def arms(model: mujoco.MjModel) -> list[int]:
-    """Joints of the motors."""
-    return [int(model.actuator(name).trnid[0]) for name in names(motors(model))]
+    """Joints of the motors that have one."""
+    return [int(model.actuator(name).trnid[0]) for name in turning(model, mujoco.mjtTrn.mjTRN_JOINT)]
+
+
+def spindles(model: mujoco.MjModel) -> list[str]:
+    """Motors that wind a tendon up."""
+    return turning(model, mujoco.mjtTrn.mjTRN_TENDON)
 
 
 @pytest.fixture(params=EYES)
@@ -87,11 +100,14 @@ def test_motors_are_read_from_the_model(eye: str) -> None:
     found = motors(model)
     assert len(set(names(found))) == len(found) > 0
     assert np.isfinite(ranges(found)).all()
-    for motor, joint, (low, high) in zip(found, arms(model), ranges(found), strict=True):
+    assert len(arms(model)) + len(spindles(model)) == len(found)
+    assert {int(model.joint(joint).type[0]) for joint in arms(model)} <= {mujoco.mjtJoint.mjJNT_HINGE}
+    for motor, (low, high) in zip(found, ranges(found), strict=True):
         assert model.actuator_ctrllimited[model.actuator(motor.name).id]
         np.testing.assert_allclose(np.deg2rad([low, high]), model.actuator(motor.name).ctrlrange, rtol=1e-15)
         assert low <= motor.working[0] < motor.working[1] <= high
-        assert (motor.unit, model.joint(joint).type) == ("deg", mujoco.mjtJoint.mjJNT_HINGE)
+        assert low < motor.rest < high
+        assert motor.unit == "deg"
 
 
 def test_motors_are_the_three_actuators_with_limits(preset: str) -> None:
@@ -122,23 +138,24 @@ def test_sensors_show_the_state(eye: str) -> None:
     assert model.nsensor == 2 + model.ntendon
 
 
-def test_tension_from_the_length_sensors_makes_the_torque(preset: str) -> None:
-    model = build_model(preset)
+def test_tension_from_the_length_sensors_makes_the_torque(eye: str) -> None:
+    model = build_model(eye)
     data = pose(model)
     data.joint("eye").qvel = 0
     mujoco.mj_forward(model, data)
-    tension = tendon_tension(model, data.ten_length)
+    pulled, own = data.qfrc_passive + data.qfrc_actuator, model.joint("eye").dofadr[0] + np.arange(3)
+    tension = Tendons.of(model).tension(data.ten_length, data.ctrl)
     assert (tension >= 0).all()
     elastics = Elastics.from_model(model)
     turn = rotation(data.joint("eye").qpos)
     torque = np.zeros(3)
-    for i in range(len(TENDONS)):
-        at = turn.apply(elastics.insertion[i])
-        arm = Rotation.from_rotvec(data.joint(MOTORS[elastics.motor[i]]).qpos[0] * elastics.arm_axis[elastics.motor[i]])
-        end = arm.apply(elastics.arm_end[i]) + elastics.arm_centre[elastics.motor[i]]
-        toward = (end if np.isnan(elastics.via[i]).any() else elastics.via[i]) - at
-        torque += np.cross(at, tension[i] * toward / np.linalg.norm(toward))
-    np.testing.assert_allclose(turn.apply(data.joint("eye").qfrc_passive), torque, atol=1e-12)
+    for i in range(model.ntendon):
+        at, end, m = turn.apply(elastics.insertion[i]), elastics.via[i], elastics.motor[i]
+        if np.isnan(end).any():
+            arm = Rotation.from_rotvec(data.joint(arms(model)[m]).qpos[0] * elastics.arm_axis[m])
+            end = arm.apply(elastics.arm_end[i]) + elastics.arm_centre[m]
+        torque += np.cross(at, tension[i] * (end - at) / np.linalg.norm(end - at))
+    np.testing.assert_allclose(turn.apply(pulled[own]), torque, atol=1e-12)
 
 
 def test_elastics_are_those_of_the_author(preset: str) -> None:
@@ -196,8 +213,8 @@ def test_static_yaw_of_the_thesis_eye() -> None:
 
 
 @pytest.mark.parametrize("step_s", [5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3])
-def test_arms_stand_on_the_command_one_step_later(eye: str, step_s: float) -> None:
-    model = build_model(eye, step_s=step_s)
+def test_arms_stand_on_the_command_one_step_later(preset: str, step_s: float) -> None:
+    model = build_model(preset, step_s=step_s)
     assert model.opt.timestep == step_s
     data = mujoco.MjData(model)
     rng = np.random.default_rng(1)
@@ -208,10 +225,11 @@ def test_arms_stand_on_the_command_one_step_later(eye: str, step_s: float) -> No
         np.testing.assert_allclose(model.actuator_gear[:, 0] * stand, data.ctrl, atol=3e-6)  # 2e-4 deg
 
 
-def test_file_alone_is_the_thesis_preset_at_1_ms() -> None:
+@pytest.mark.parametrize(("preset", "file"), [("thesis", "eye3.xml"), ("six", "eye6.xml")])
+def test_file_alone_is_the_preset_at_1_ms(preset: str, file: str) -> None:
     """What `python -m mujoco.viewer` and any other MuJoCo program opens."""
-    bare = mujoco.MjModel.from_xml_path(str(data_folder("eye_mjcf") / "eye3.xml"))
-    assert model_hash(bare) == model_hash(build_model("thesis", step_s=0.001))
+    bare = mujoco.MjModel.from_xml_path(str(data_folder("eye_mjcf") / file))
+    assert model_hash(bare) == model_hash(build_model(preset, step_s=0.001))
 
 
 def test_gravity_adds_only_the_torque_of_the_centre_of_mass(eye: str) -> None:
@@ -228,11 +246,10 @@ def test_gravity_adds_only_the_torque_of_the_centre_of_mass(eye: str) -> None:
         mujoco.mj_forward(model, data)
         mujoco.mj_forward(without, reference)
         turn = rotation(data.joint("eye").qpos)
-        torque = turn.apply(data.joint("eye").qfrc_actuator)
+        torque = turn.apply(data.joint("eye").qfrc_actuator - reference.joint("eye").qfrc_actuator)
         np.testing.assert_allclose(torque, np.cross(turn.apply(centre), weight), atol=1e-14)
         np.testing.assert_array_equal(data.qfrc_passive, reference.qfrc_passive)
-        for name, joint in zip(names(motors(model)), arms(model), strict=True):
-            assert data.actuator(name).ctrl[0] == 0.3
+        for joint in arms(model):
             assert data.joint(joint).qfrc_actuator[0] == reference.joint(joint).qfrc_actuator[0]
 
 
@@ -301,9 +318,10 @@ def test_meshes_are_what_the_script_makes(
     make_meshes.main(make_meshes.Options(out=tmp_path))
     folder = data_folder("eye_mjcf")
     shipped = sorted(path.name for path in (folder / "meshes").iterdir())
-    used = re.findall(r'file="(\S+)"', (folder / "eye3.xml").read_text(encoding="utf-8"))
+    models = [(folder / name).read_text(encoding="utf-8") for name in ("eye3.xml", "eye6.xml")]
+    used = re.findall(r'file="(\S+)"', "".join(models))
     assert sorted(path.name for path in tmp_path.iterdir()) == shipped == sorted(used)
-    assert sum((folder / "meshes" / name).stat().st_size for name in shipped) < 300_000
+    assert sum((folder / "meshes" / name).stat().st_size for name in shipped) < 720_000
     for name in shipped:
         made, there = triangles(tmp_path / name), triangles(folder / "meshes" / name)
         assert made.shape == there.shape
@@ -317,6 +335,50 @@ def test_eyeball_carries_the_insertions(make_meshes: ModuleType, preset: str) ->
     corners = triangles(data_folder("eye_mjcf") / "meshes" / "sclera.stl").reshape(-1, 3)
     assert corners[:, 0].min() < insertion[:, 0].min() - 0.005
     assert np.linalg.norm(corners, axis=1).max() == pytest.approx(np.linalg.norm(insertion[0]), abs=2e-5)
+
+
+@pytest.fixture(scope="module")
+def six() -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """The six-motor eye with its looks, straight ahead."""
+    model = mujoco.MjModel.from_xml_path(str(data_folder("eye_mjcf") / "eye6.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def ends(six: tuple[mujoco.MjModel, mujoco.MjData]) -> Iterator[tuple[str, Array, Array]]:
+    """Name, place on the head and insertion of each cable."""
+    model, data = six
+    for name in (model.tendon(i).name for i in range(model.ntendon)):
+        yield name, data.site(f"head_{name}").xpos, data.site(f"eye_{name}").xpos
+
+
+def test_globe_of_six_motors_carries_the_insertions(six: tuple[mujoco.MjModel, mujoco.MjData]) -> None:
+    corners = triangles(data_folder("eye_mjcf") / "meshes" / "eye6_sclera.stl").reshape(-1, 3)
+    insertion = np.array([on_eye for _, _, on_eye in ends(six)])
+    assert np.linalg.norm(corners, axis=1).max() == pytest.approx(np.linalg.norm(insertion, axis=1), abs=1.5e-4)
+    assert corners[:, 0].min() < insertion[:, 0].min() - 0.005
+
+
+def test_spindles_stand_where_the_rest_lengths_put_them(six: tuple[mujoco.MjModel, mujoco.MjData]) -> None:
+    model, data = six
+    drum = np.linalg.norm(triangles(data_folder("eye_mjcf") / "meshes" / "eye6_spindle.stl")[..., :2], axis=-1)
+    for name, head, on_eye in ends(six):
+        gain, stiffness = -model.actuator(name).gainprm[0], -model.actuator(name).biasprm[1]
+        behind = 20 / stiffness - np.linalg.norm(head - on_eye)  # 20 N per relative stretch
+        away = np.linalg.norm(data.geom(f"spindle_{name}").xpos - head)
+        assert np.hypot(behind, gain / stiffness) == pytest.approx(away, abs=1e-6)
+        assert np.isclose(drum, gain / stiffness, atol=1e-6).any()
+
+
+def test_head_hides_no_cable_of_six_motors(six: tuple[mujoco.MjModel, mujoco.MjData]) -> None:
+    model, data = six
+    camera, eye, hit = data.cam("three_quarter").xpos, model.body("eye").id, np.zeros(1, np.int32)
+    for name, head, on_eye in ends(six):
+        for part in np.linspace(0.25, 1, 30):  # clear of its eyelet
+            ray = head + part * (on_eye - head) - camera
+            distance = mujoco.mj_ray(model, data, camera, ray, None, 1, eye, hit, None)
+            assert distance < 0 or distance > 0.999, f"{name} behind {model.geom(hit[0]).name}"
 
 
 def test_meshes_are_closed() -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orient_eye import figures
 from orient_eye.figures import gaze as pictures
+from orient_eye.figures.trajectory import draw_trajectory
 from orient_eye.listing import directions, ficks_torsion, with_torsion
 from orient_eye.motor import Motor
 from orient_eye.movement.main_sequence import fit_peak_velocity
@@ -167,6 +168,73 @@ def test_motors_over_time(tensions: bool) -> None:
     for k in (1, 2, 3):
         np.testing.assert_array_equal(curves(figure.axes[0])[f"motor{k}"][:, 1], trajectory.motor[0, :, k - 1])
     assert ("elastic5" in words(figure)) == tensions
+
+
+PAIRS = np.array([[0, 2], [1, 3], [4, 5]])
+
+
+def muscles() -> tuple[Trajectory, Measures]:
+    """Six motors that wind up a cable each: in the first saccade motor 1 pulls against 3, in the second 3 against 1."""
+    trajectory, measures = made(TOWARD[:3])
+    change = EASE[:, None] * np.array([2.0, 1, -2, 1, 0, 0]) * np.array([1.0, -1, 0.5])[:, None, None]
+    motor, tension = 60 + 10 * change, 3 + change
+    names = tuple(Motor(name, rest=60.0) for name in ("a", "b", "c", "d", "e", "f"))
+    return replace(
+        trajectory, motor=motor, command=motor, tension=tension, motors=names, tendon_names=tuple("abcdef")
+    ), measures
+
+
+def test_agonist_and_antagonist_and_what_parts_them() -> None:
+    trajectory, measures = muscles()
+    found = pictures.antagonist_correlation(trajectory, measures, PAIRS)
+    np.testing.assert_allclose(found[:2], [-1, 1])
+    assert np.isnan(found[2])
+    figure = pictures.antagonists_over_time(trajectory, measures, PAIRS, [*found[:2], 0.0])
+    told = words(figure)
+    assert "a/c -1.000, b/d 1.000" in told
+    assert "a (dashed c)" in curves(figure.axes[0])
+    assert "c (dashed a)" in curves(figure.axes[1])
+    mean, half = (line.get_ydata() for line in figure.axes[6].lines[:2])
+    np.testing.assert_allclose(mean, 3)
+    np.testing.assert_allclose(half, 2 * EASE, atol=1e-12)
+    together, apart = (line.get_ydata() for line in figure.axes[6].lines[2:4])
+    np.testing.assert_allclose(together, 3 + EASE)
+    np.testing.assert_allclose(apart, 0, atol=1e-12)
+
+
+def test_antagonists_have_one_colour(tmp_path: Path) -> None:
+    trajectory, measures = muscles()
+    for row in (0, 6):
+        lines = pictures.motors_over_time(trajectory, measures, PAIRS).axes[row].lines
+        style = {line.get_label(): (line.get_color(), line.get_linestyle()) for line in lines}
+        assert list(style) == ["a", "c", "b", "d", "e", "f"]
+        assert style["a"][0] == style["c"][0] != style["b"][0]
+        assert (style["a"][1], style["c"][1]) == ("-", "--")
+    plain, paired = (
+        draw_trajectory(trajectory, tmp_path / f"{name}.png", pairs).read_bytes()
+        for name, pairs in (("plain", None), ("paired", PAIRS))
+    )
+    assert plain != paired
+
+
+def test_the_group_and_people_stand_beside_a_main_sequence() -> None:
+    size = np.array([4.0, 8, 16, 30])
+    trajectory, measures = made(np.concatenate([size[:, None] * [1, 0], size[:, None] * [0, 1], [[9.0, 9]]]))
+    peak = np.where(np.arange(9) < 4, 300, 450) * (1 - np.exp(-measures.amplitude_deg / 10))
+    measures = replace(measures, peak_velocity_deg_s=peak, settling_time_s=0.02 + 0.003 * measures.amplitude_deg)
+    figure = pictures.main_sequence_beside_group(
+        (trajectory, measures), (trajectory, measures), np.full(len(measures.final), 0.25)
+    )
+    cells = [
+        [cell.get_text().get_text() for _, cell in sorted(table.get_celld().items())]
+        for axes in figure.axes
+        for table in axes.tables
+    ]
+    fits, ends = ["; ".join(one) for one in cells]
+    assert "horizontal; 300; 10.0; 20; 3.0; vertical; 450; 10.0; 20; 3.0" in fits
+    assert "288 to 337; 12 to 15; 56 to 58; 3.5" in fits
+    assert "people; 505; 5.1; 21; 2.2" in fits
+    assert "ours; 0.25; 0.00; 0.0; the group's programs; 1.3 to 1.9; 0.6 to 1.0; 0.9" in ends
 
 
 def test_a_motor_that_lags_is_drawn_beside_its_command() -> None:

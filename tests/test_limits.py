@@ -24,7 +24,7 @@ from orient_eye.commands.motor_file import read_command
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
 from orient_eye.learning.config import TrainConfig
-from orient_eye.motor import Motor
+from orient_eye.motor import Motor, rests
 from orient_eye.plants import make_plant, restore_plant
 from orient_eye.plants.limited_motor import follow, peaks
 from orient_eye.plants.limits import wiring
@@ -37,6 +37,7 @@ from orient_eye.task.saccade import SaccadeTask
 from test_policy_commands import sensible_policy
 
 Array = NDArray[np.float64]
+SIX = ("IR", "MR", "SR", "LR", "IO", "SO")
 STEP = 0.001
 SLACK = 1 + 1e-6
 settings.register_profile("limits", deadline=None, max_examples=60, derandomize=True)
@@ -256,6 +257,39 @@ def test_a_rig_limits_the_motors_of_its_names(tmp_path: Path) -> None:
         make_plant("mujoco", rig=Rig("r", (RigMotor("servo"),), {"yaw": {"servo": 1.0}}))
     with pytest.raises(InputError, match="rig 'r' turns yaw, not pitch"):
         LinearPlant(Surrogate(1.0, 10.0, axis="pitch"), rig=rig)
+
+
+def test_a_rig_of_an_eye_under_pretension_has_its_motors_rest_inside_their_range() -> None:
+    def rig(low: float, high: float) -> Rig:
+        each = tuple(RigMotor(name, range=(low, high), speed_limit=2000.0) for name in SIX)
+        return Rig("r", each, {"yaw": {"MR": 0.7, "LR": -0.7}, "pitch": {"IR": 1.0, "SR": -1.0, "IO": -1.0, "SO": 1.0}})
+
+    free, plant = make_plant("tavares", eye="six"), make_plant("tavares", eye="six", rig=rig(0, 200))
+    assert rests(plant.motors) == pytest.approx(rests(free.motors))
+    assert {motor.working for motor in plant.motors} == {(0.0, 200.0)}
+    begin = rests(plant.motors)
+    told = np.tile(begin, (1, 300, 1))
+    told[:, 1:, 1] += 15.0
+    movement = plant.move(told)
+    assert movement.limited.all()
+    moved = movement.trajectory()
+    np.testing.assert_allclose(moved.motor[0, :9, 1], begin[1] + np.minimum(2.0 * np.arange(9), 15.0), atol=1e-9)
+    np.testing.assert_array_equal(free.move(moved.motor).trajectory().orientation, moved.orientation)
+    assert wiring(plant, rig(0, 200)).motors == plant.motors
+    with pytest.raises(InputError, match=r"'IR' go from -30 to 30 deg, but it stands at 57.84 .* a range around that"):
+        make_plant("mujoco", eye="six", rig=rig(-30, 30))
+
+
+def test_the_wiring_of_one_motor_that_rests_elsewhere() -> None:
+    """Its axis is told by a degree from there: at 0 the cable of this one hangs slack and turns nothing."""
+
+    class Slack(LinearPlant):
+        def rest(self, motor: Array) -> Array:
+            return super().rest(np.maximum(motor, 20.0))
+
+    plant = Slack(Surrogate(1.5, 10.0, motor="MR", axis="pitch", rest=60.0))
+    rig = Rig("r", (RigMotor("a"), RigMotor("b")), {"yaw": {"b": 1.0}, "pitch": {"a": 1.0}})
+    assert wiring(plant, rig).axis == "pitch"
 
 
 def test_the_pulse_rates_of_an_eye_lie_around_its_poles() -> None:

@@ -39,7 +39,7 @@ Poles = tuple[Any, ...]
 K = -1.4758  # a gain may be negative
 
 properties = settings(deadline=None, max_examples=60, derandomize=True)
-variant = st.sampled_from(["1", "2", "3"])
+variant = st.sampled_from(["1", "2", "3", "smooth"])
 
 
 def log_floats(low: float, high: float) -> st.SearchStrategy[float]:
@@ -57,11 +57,11 @@ gap = st.sampled_from([0.0, 1e-14, -1e-9, 1e-5, -1e-3, 0.01, -0.04, 0.0499, 0.05
 
 def command(B: Any, k0: Any, C: Any = 1.0, pulse: str = "1", F: Any = 0.0, D: Any = 1.0) -> PulseStep:
     F, B, D, k0, C = np.broadcast_arrays(*(np.reshape(np.asarray(x, float), (-1, 1)) for x in (F, B, D, k0, C)))
-    return PulseStep(F, B, D, k0, pulse, None if pulse == "1" else C)
+    return PulseStep(F, B, D, k0, pulse, C if pulse in ("2", "3") else None)
 
 
 def of_poles(pulse: str, B: float, C: float) -> list[float]:
-    return {"1": [B, B], "2": [B, B + C], "3": [B, B + C, B + C]}[pulse]
+    return {"1": [B, B], "2": [B, B + C], "3": [B, B + C, B + C], "smooth": [B, B, B]}[pulse]
 
 
 def real(poles: Poles) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from orient_eye.cli.sysid import Sysid
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import build_model, motors
+from orient_eye.figures.modes import draw_modes
 from orient_eye.modal_surrogate import (
     MODES,
     ModalSurrogate,
@@ -26,7 +27,7 @@ from orient_eye.modal_surrogate import (
     as_vector,
     vector_rate,
 )
-from orient_eye.plants import make_plant
+from orient_eye.plants import make_plant, restore_plant
 from orient_eye.plants.linear import LinearPlant
 from orient_eye.plants.modal import ModalPlant
 from orient_eye.plants.tavares import TavaresPlant
@@ -141,6 +142,33 @@ def test_what_motors_cannot_hold_is_refused() -> None:
     np.testing.assert_array_equal(plant.motor_rates(), [5.0, 16.0, 5.0])
 
 
+@settings(deadline=None, max_examples=30, derandomize=True)
+@given(seed=st.integers(0, 2**30), motors=st.integers(3, 7))
+def test_motors_that_rest_elsewhere_make_the_same_eye(seed: int, motors: int) -> None:
+    """All counts from where they rest, and of all ways to hold an orientation theirs is the least change from there."""
+    rng = np.random.default_rng(seed)
+    K, rest, called = rng.normal(size=(3, motors)), rng.uniform(-90, 90, motors), tuple(f"m{i}" for i in range(motors))
+    at_zero = ModalSurrogate(called, {axis: Mode(tuple(k), 9.0) for axis, k in zip(MODES, K, strict=True)})
+    one, other = ModalPlant(at_zero), ModalPlant(replace(at_zero, rest=tuple(rest)))
+    assert tuple(motor.rest for motor in other.motors) == pytest.approx(tuple(rest))
+    motor, r = rng.uniform(-8, 8, (2, 30, motors)), np.append(1.0, rng.uniform(-0.1, 0.1, 3))
+    start = State(np.tile(r, (2, 1)), motor[:, 0] + 1.0)
+    moved = one.move(motor, start).trajectory()
+    same = other.move(motor + rest, replace(start, motor=start.motor + rest)).trajectory()
+    np.testing.assert_allclose(same.orientation, moved.orientation, atol=1e-9)
+    np.testing.assert_allclose(same.angular_velocity, moved.angular_velocity, atol=1e-6)
+
+    held = other.hold(one.rest(motor[:, 0]), called)
+    assert angle_between(other.rest(held), one.rest(motor[:, 0])).max() < 1e-5
+    np.testing.assert_allclose(held - rest, one.hold(one.rest(motor[:, 0]), called), atol=1e-9)
+    assert (np.linalg.norm(held - rest, axis=1) <= np.linalg.norm(motor[:, 0], axis=1) + 1e-9).all()
+    some = other.held(other.rest(rest + motor[:, 0] * (np.arange(motors) < 3)), called[:3])
+    np.testing.assert_allclose(some[:, 3:], np.tile(rest[3:], (2, 1)))  # who is not driven stands at rest
+    again = restore_plant(json.loads(json.dumps(other.identity())))
+    assert (again.identity(), again.motors) == (other.identity(), other.motors)
+    assert "rest" not in one.identity()
+
+
 # --- identification -------------------------------------------------------------------------------
 
 gains = st.lists(
@@ -155,7 +183,7 @@ def test_a_known_eye_is_found(K: tuple[list[float], ...], w0: tuple[float, ...],
     truth = ModalSurrogate(NAMES, {a: Mode(tuple(k), w) for a, k, w in zip(MODES, K, w0, strict=True)})
     found = identify_modes(ModalPlant(truth), np.random.default_rng(seed), fitted=8, held_out=4)
     np.testing.assert_allclose(found.surrogate.K, K, rtol=1e-5)
-    # Gains are kept to six digits: up to 5e-6 of the 60 deg that an eye turns are off, and the poles take a share of it.
+    # Gains are kept to six digits: up to 5e-6 of the 60 deg that an eye turns are off, and the poles take their share.
     np.testing.assert_allclose([mode.w0 for mode in found.surrogate.modes.values()], w0, rtol=1e-4)
     assert found.order == "first_order"
     assert found.rms_deg["first_order"] < 60 * 3 * 5e-6
@@ -172,6 +200,70 @@ def test_a_known_eye_of_second_order_is_found() -> None:
     assert (row["order"], row["from_deg"], row["to_deg"]) == ("first_order", 0, None)
     assert row["rms_deg"] > 1
     assert sum(r["samples"] for r in found.rows if r["order"] == "first_order") == 2 * row["samples"]
+
+
+SIX = ("IR", "MR", "SR", "LR", "IO", "SO")
+
+
+@settings(deadline=None, max_examples=4, derandomize=True)
+@given(seed=st.integers(0, 2**30), w0=st.tuples(*[st.floats(4, 60)] * 3))
+def test_a_known_eye_of_six_motors_is_found(seed: int, w0: tuple[float, ...]) -> None:
+    """Each gain by itself, though three motors would do to hold the eye."""
+    rng = np.random.default_rng(seed)
+    K = rng.choice((-1, 1), (3, 6)) * rng.uniform(0.3, 1, (3, 6)) * np.array([0.2, 0.3, 0.7])[:, None]
+    assume(np.linalg.cond(K) < 10)
+    modes = {axis: Mode(tuple(k), w) for axis, k, w in zip(MODES, K, w0, strict=True)}
+    truth = ModalSurrogate(SIX, modes, ((-300.0, 600.0),) * 6, rest=tuple(rng.uniform(50, 120, 6)))
+    found = identify_modes(ModalPlant(truth), np.random.default_rng(seed), fitted=8, held_out=4)
+    np.testing.assert_allclose(found.surrogate.K, K, rtol=1e-5)
+    assert (found.surrogate.rest, found.surrogate.ranges) == (truth.rest, truth.ranges)
+    np.testing.assert_allclose([mode.w0 for mode in found.surrogate.modes.values()], w0, rtol=1e-3)
+    assert found.order == "first_order"
+    assert found.rms_deg["first_order"] < 60 * 6 * 5e-6
+    assert (found.workspace_deg, found.ran_away) == (35.0, 0)
+
+
+def test_an_eye_that_runs_away_is_identified_where_it_stays() -> None:
+    """The six-motor eye is not stable from 28 deg to the left at pretension 2: seven tenths of that are asked for."""
+    plant = make_plant("tavares", eye="six", pretension=2.0)
+    found = identify_modes(plant, np.random.default_rng(0), fitted=30, held_out=60, order="first_order")
+    assert 17 < found.workspace_deg < 20
+    assert found.ran_away > 0
+    assert found.surrogate.details["ran_away"] == found.ran_away
+    assert 90 - found.ran_away <= len(found.held_out) + 30 <= 90
+    assert found.surrogate.rest == tuple(motor.rest for motor in plant.motors)
+    assert "more, fitted or held out, ran away" in draw_modes(found).subfigs[0].get_suptitle()
+    slow, fast = (found.surrogate.modes[axis].w0 for axis in ("yaw", "pitch"))
+    assert slow is not None
+    assert fast is not None
+    assert slow < 2.2
+    assert fast > 10
+
+
+def test_an_eye_that_its_motors_hardly_hold_is_refused() -> None:
+    modes = {axis: Mode(k, 9.0) for axis, k in zip(MODES, np.eye(3, 4).tolist(), strict=True)}
+    tight = ModalSurrogate(("a", "b", "c", "d"), modes, ((9.5, 10.5),) * 4, rest=(10.0,) * 4)
+    with pytest.raises(InputError, match="the motors of plant 'modal' do not hold it next to straight ahead"):
+        identify_modes(ModalPlant(tight), np.random.default_rng(0))
+
+
+def test_the_shipped_surrogate_is_the_six_motor_eyes() -> None:
+    """Pulse-steps of a policy's kind: motors that change least, k0 near the poles."""
+    eye, plant, rng = TavaresPlant("six", threads=1), make_plant("modal", surrogate="six-3d"), np.random.default_rng(5)
+    assert plant.motors == eye.motors
+    far, way = 28 * np.sqrt(rng.uniform(size=120)), rng.uniform(-np.pi, np.pi, 120)
+    q = from_euler(far * np.cos(way), far * np.sin(way), 0 * far)
+    F, D = eye.hold(q, SIX).reshape(2, 60, 6)
+    command = PulseStep(F, rng.uniform(20, 70, F.shape), D, np.tile([18.0, 4.5, 18.0, 4.5, 18.0, 18.0], (60, 1)))
+    start = State(eye.rest(F), F)
+    true, told = (p.move(command, start, 0.7).trajectory().orientation for p in (eye, plant))
+    assert np.sqrt(np.mean(angle_between(true, told) ** 2)) < 2.6
+    assert angle_between(true[:, 0], true[:, -1]).mean() > 20
+    np.testing.assert_allclose(plant.rest(rest_of(eye)), eye.rest(rest_of(eye)), atol=1e-6)
+
+
+def rest_of(plant: TavaresPlant) -> Array:
+    return np.array([[motor.rest for motor in plant.motors]])
 
 
 def test_an_eye_of_one_motor_is_refused() -> None:
@@ -233,7 +325,9 @@ def test_options_that_say_nothing_are_refused(options: dict[str, Any], told: str
 def test_round_trip(tmp_path: Path, surrogate: ModalSurrogate) -> None:
     ranges = ((-80.0, 80.0), (-70.0, 80.0), (-1.0, 2.0))
     one = replace(surrogate, ranges=ranges, dead_time=0.01, eye="thesis", source="Ünit", details={"n": [1, 2.5]})
-    for each in (one, surrogate):
+    wound = replace(one, rest=(57.8, -60.0, 0.5))
+    assert [motor.working for motor in wound.as_motors()] == list(ranges)
+    for each in (one, surrogate, wound):
         assert ModalSurrogate.load(each.save(tmp_path / "surrogate_3d.json")) == each
     assert [motor.working for motor in one.as_motors()] == [(-40, 40), (-40, 40), (-1, 2)]
 
@@ -253,6 +347,11 @@ GOOD = {"format": "orient-eye modal surrogate 1", **FIRST.to_plain()}
         (json.dumps(GOOD | {"motors": ["a", "b"]}), "of 2 motors has as many of each number"),
         (json.dumps(GOOD | {"ranges": [[-1, 1]]}), "has as many of each number"),
         (json.dumps(GOOD | {"dead_time": -1}), "dead_time must be a number from 0 to 10 s"),
+        (json.dumps(GOOD | {"rest": [57.0]}), "has as many of each number"),
+        (json.dumps(GOOD | {"rest": [1, 2, "3"]}), "rest must be a number from"),
+        (json.dumps(GOOD | {"rest": [1, 2, 1e7]}), "rest must be a number from"),
+        (json.dumps(GOOD | {"rest": 57.0}), "not iterable"),
+        (json.dumps(GOOD | {"rest": [0, 0, 9], "ranges": [[-1, 1]] * 3}), "'motor3' rests inside its range"),
     ],
 )
 def test_files_that_are_no_modal_surrogate_are_refused(tmp_path: Path, content: str, told: str) -> None:

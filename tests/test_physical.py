@@ -12,6 +12,7 @@ import pytest
 from mujoco import sysid
 from numpy.typing import NDArray
 
+from orient_eye.cli.sysid import Sysid
 from orient_eye.cli.sysid_physical import physical
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import build_model
@@ -217,6 +218,7 @@ def test_the_command_writes_numbers_and_an_eye(tmp_path: Path, recorded: list[Pa
 
 
 @installed
+@pytest.mark.usefixtures("plain")
 def test_the_fitted_eye_is_learned_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recordings = read_recordings(record(tmp_path, changed_eye(tmp_path / "true.xml"), [(0, 15, 0)]))
     eye = str(tmp_path / "eye.xml")
@@ -268,6 +270,20 @@ def test_a_rig_tells_its_motors_in_counts(tmp_path: Path, recorded: list[Path]) 
     np.testing.assert_allclose(told.motor, read_recordings(recorded[:1])[0].motor, atol=1e-9)
     with pytest.raises(InputError, match="tau2_deg"):
         read_recordings([path])
+
+
+def test_an_eye_wound_up_by_spindles_is_refused(tmp_path: Path) -> None:
+    six = make_plant("tavares", eye="six")
+    rest = np.array([motor.rest for motor in six.motors])
+    assert (rest > 50).all()
+    rows = [f"{0.01 * k},{rest[1] + min(k, 5)},{0.5 * min(k, 5)}" for k in range(20)]
+    table = tmp_path / "mr.csv"
+    table.write_text("\n".join(["t_s,MR_deg,yaw_deg", *rows]), encoding="utf-8")
+    (read,) = read_recordings([table], "six")
+    np.testing.assert_allclose(read.motor[:, [0, 2, 3, 4, 5]], np.tile(rest[[0, 2, 3, 4, 5]], (20, 1)))
+    with pytest.raises(InputError, match=r"eye 'six' is wound up by spindles, IR, MR, SR, LR, IO, SO.*another --eye"):
+        Sysid(physical=True, plant_options={"eye": "six"}, recording=(table,), out=tmp_path / "run").run()
+    assert not (tmp_path / "run").exists()
 
 
 def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, recorded: list[Path]) -> None:

@@ -1,4 +1,4 @@
-"""The pulse-step command and its low-pass response: laws of every entry of `PULSES`, then the thesis' three.
+"""The pulse-step command and its low-pass response: laws of every entry of `PULSES`, then ours one by one.
 
 The laws are held against a chain of first-order filters, one for each pole of the pulse, and quadrature. The witness of
 the thesis' pulses is written from the definitions: f(t) of each variant, A from D (thesis 4.9, 4.15 and the corrected
@@ -6,7 +6,7 @@ the thesis' pulses is written from the definitions: f(t) of each variant, A from
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.linalg import expm, solve_continuous_lyapunov
 from scipy.optimize import brentq, minimize_scalar
-from scipy.special import gammainc
+from scipy.special import gammainc, gammaincinv
 
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.commands.pulses import PULSES, keeps_speed_limit, varying_C
@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 K, W0 = 1.4758, 17.5  # thesis 3.3.1
 PLANT = make_plant("lpf", surrogate=Surrogate(K, W0))
 THESIS = ("1", "2", "3")
+OURS = (*THESIS, "smooth")
 VARYING = [name for name in PULSES if PULSES[name].onset is not None]
 
 properties = settings(deadline=None, max_examples=40, derandomize=True)
@@ -55,19 +56,30 @@ class Plain:
 
     @property
     def A(self) -> float:
-        """Thesis 4.9, 4.15, and 4.24 with B (B + C)^2."""
+        """Thesis 4.9, 4.15, and 4.24 with B (B + C)^2; that of t^2 by the integral 2 / B^3 of t^2 e^(-Bt)."""
         B, C = self.B, self.C
-        by_step = {"1": B**2 / self.k0, "2": B * (B + C) / (C * self.k0), "3": B * (B + C) ** 2 / (C**2 * self.k0)}
-        return (self.D - self.F) * by_step[self.variant]
+        areas = {"1": 1 / B**2, "2": C / (B * (B + C)), "3": C**2 / (B * (B + C) ** 2), "smooth": 2 / B**3}
+        return (self.D - self.F) / (self.k0 * areas[self.variant])
 
     def onset(self, t: float) -> float:
-        """f(t): t (4.3), 1 - e^(-Ct) (4.10), 1 - e^(-Ct) - Ct e^(-Ct) (4.19); without cancellation."""
-        forms = {"1": lambda: t, "2": lambda: -np.expm1(-self.C * t), "3": lambda: gammainc(2, self.C * t)}
+        """f(t): t (4.3), 1 - e^(-Ct) (4.10), 1 - e^(-Ct) - Ct e^(-Ct) (4.19), without cancellation; t^2."""
+        C = self.C
+        forms = {
+            "1": lambda: t,
+            "2": lambda: -np.expm1(-C * t),
+            "3": lambda: gammainc(2, C * t),
+            "smooth": lambda: t**2,
+        }
         return float(forms[self.variant]())
 
     def onset_rate(self, t: float) -> float:
         C = self.C
-        forms = {"1": lambda: 1.0, "2": lambda: C * np.exp(-C * t), "3": lambda: C**2 * t * np.exp(-C * t)}
+        forms = {
+            "1": lambda: 1.0,
+            "2": lambda: C * np.exp(-C * t),
+            "3": lambda: C**2 * t * np.exp(-C * t),
+            "smooth": lambda: 2 * t,
+        }
         return float(forms[self.variant]())
 
     def pulse(self, t: float) -> float:
@@ -327,12 +339,13 @@ def test_a_pulse_without_an_onset_keeps_no_limit(name: str) -> None:
     assert not keeps_speed_limit(PULSES[name], *np.ones((3, 2, 1))).any()
 
 
-# --- the thesis' pulses, against quadrature -------------------------------------------------------
+# --- our pulses, against quadrature ---------------------------------------------------------------
 
 ONSETS: dict[str, tuple[float, ...]] = {
     "1": (1.0,),
     "2": (0.3, 3.6, 85.0, 142.0, 5000.0),
     "3": (0.9, 3.6, 85.0, 5000.0),
+    "smooth": (1.0,),
 }
 CASES = [(variant, C) for variant, onsets in ONSETS.items() for C in onsets]
 
@@ -345,18 +358,18 @@ def test_against_quadrature(variant: str, C: float, B: float) -> None:
         hold_against_quadrature(Plain(variant, F, B, D, k0, C))
 
 
-@pytest.mark.parametrize("variant", THESIS)
+@pytest.mark.parametrize("variant", OURS)
 @pytest.mark.parametrize("gap", [0.0, *(sign * 10.0**-k for k in range(3, 13) for sign in (1, -1))])
 def test_against_quadrature_where_a_pole_meets_w0(variant: str, gap: float) -> None:
-    """B = w0, and B + C = w0, exactly and nearly: there the partial fractions divide zero by zero."""
+    """B = w0, also with k0, and B + C = w0, exactly and nearly: there the partial fractions divide zero by zero."""
     k0 = W0 if gap == 0 else 12.0
     hold_against_quadrature(Plain(variant, 3.0, W0 + gap, 21.0, k0, 3.6))
-    if variant != "1":
+    if variant in THESIS[1:]:
         hold_against_quadrature(Plain(variant, 3.0, W0 + gap - 3.6, 21.0, k0, 3.6))
 
 
 @properties
-@given(variant=st.sampled_from(THESIS), F=angle, B=decay, D=angle, k0=gain, C=onset)
+@given(variant=st.sampled_from(OURS), F=angle, B=decay, D=angle, k0=gain, C=onset)
 def test_against_quadrature_anywhere(variant: str, F: float, B: float, D: float, k0: float, C: float) -> None:
     if abs(D - F) > 1e-3 and C >= 0.01 * B:
         hold_against_quadrature(Plain(variant, F, B, D, k0, C))
@@ -372,11 +385,11 @@ def test_varying_C_keeps_the_accuracy(variant: str, B: float, step: float) -> No
 
 
 @properties
-@given(variant=st.sampled_from(THESIS), F=angle, B=decay, D=angle, k0=gain, C=onset)
+@given(variant=st.sampled_from(OURS), F=angle, B=decay, D=angle, k0=gain, C=onset)
 def test_energy_by_parseval(variant: str, F: float, B: float, D: float, k0: float, C: float) -> None:
     """Integral of |s tau(s)|^2 along the imaginary axis, by the classical table for 2nd and 3rd order."""
-    step, q = D - F, B + (0 if variant == "1" else C)
-    if variant == "3":  # s tau = A C^2 (s + k0) / ((s + B) (s + q)^2), 4.21
+    step, q = D - F, B + (C if variant in THESIS[1:] else 0)
+    if variant in ("3", "smooth"):  # s tau = A C^2 (s + k0) / ((s + B) (s + q)^2), 4.21, or its limit q = B
         exact = step**2 * B * q * (B * q**2 + k0**2 * (B + 2 * q)) / (4 * k0**2 * (B + q) ** 2)
     else:  # A C (s + k0) / ((s + B) (s + q)), 4.12; variant 1 is its limit q = B, 4.4
         exact = step**2 * B * q * (B * q + k0**2) / (2 * k0**2 * (B + q))
@@ -385,11 +398,43 @@ def test_energy_by_parseval(variant: str, F: float, B: float, D: float, k0: floa
 
 
 @pytest.mark.parametrize(("variant", "C"), CASES)
-def test_the_thesis_pulses_start_at_nothing(variant: str, C: float) -> None:
+def test_pulses_start_at_nothing(variant: str, C: float) -> None:
     for F, D in ((-12.0, 9.5), (20.0, -23.0), (7.0, 7.0)):
         plain = Plain(variant, F, 20.0, D, 12.0, C)
         assert plain.command().position([0.0])[0, 0, 0] == F
         assert plain.command().pulse_at([0.0])[0, 0, 0] == pytest.approx(0, abs=1e-12 * abs(plain.A))
+
+
+def test_the_smooth_pulse_is_the_limit_of_variant_3() -> None:
+    """C -> 0, there by its definition: our sum of its terms loses digits with C / B."""
+    at = np.linspace(0.005, 0.4, 80)
+    smooth, near = single("smooth", -5.0, 35.0, 15.0, 17.5, 1.0), Plain("3", -5.0, 35.0, 15.0, 17.5, C=1e-4)
+    for found, limit in (
+        (smooth.pulse_at(at), near.pulse),
+        (smooth.rate(at), near.rate),
+        (smooth.position(at), near.tau),
+    ):
+        exact = [limit(float(t)) for t in at]
+        np.testing.assert_allclose(found[0, :, 0], exact, rtol=0, atol=1e-5 * np.abs(found).max())
+    assert smooth.energy()[0] == pytest.approx(near.energy(), rel=1e-5)
+
+
+def test_the_smooth_pulse_is_gentle_to_the_motor() -> None:
+    """From rest, and at 44 % of variant 1's largest speed where the eye settles as soon.
+
+    At k0 = w0 the eye's way is that of the pulses' poles alone, a gamma distribution.
+    """
+    band, B = 0.01, 35.0
+    longer = float(gammaincinv(3, 1 - band) / gammaincinv(2, 1 - band))
+    one = Plain("1", 0.0, B, 20.33, 17.5)
+    as_soon, alike = replace(one, variant="smooth", B=longer * B), replace(one, variant="smooth")
+    settling = [PLANT.move(x.command()).measure(band).settling_time_s[0] for x in (one, as_soon, alike)]
+    assert settling[1:] == pytest.approx([settling[0], longer * settling[0]], rel=1e-9)
+    assert longer == pytest.approx(1.27, abs=0.005)
+    speed = [top_speed(x) for x in (one, as_soon, alike)]
+    assert [speed[1] / speed[0], speed[2] / speed[0]] == pytest.approx([0.44, 0.29], abs=0.005)
+    assert as_soon.energy() / one.energy() == pytest.approx(0.60, abs=0.005)
+    np.testing.assert_array_equal(as_soon.command().rate([0.0]), 0.0)
 
 
 @pytest.mark.parametrize(

@@ -16,11 +16,12 @@ from rerun.chunk import RrdReader
 from orient_eye import rotations
 from orient_eye.cli.view import View
 from orient_eye.errors import InputError
-from orient_eye.eyes.model import build_model, tendon_tension
+from orient_eye.eyes.model import Tendons, build_model
 from orient_eye.motor import Motor
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants.mujoco import MujocoPlant
-from orient_eye.recording import curves, record, viewer
+from orient_eye.recording import curves, record, record_sequence, viewer
+from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.scene import SLACK_COLOUR, TENSION_COLOURS, tension_colours
 
@@ -204,7 +205,7 @@ def test_a_plant_with_one_motor_and_no_tendons(tmp_path: Path) -> None:
     data.joint("eye").qpos[:] = trajectory.orientation[0, -1]
     data.joint("motor2").qpos[:] = np.deg2rad(trajectory.motor[0, -1])
     mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(tension[-1], tendon_tension(model, data.ten_length), atol=1e-9)
+    np.testing.assert_allclose(tension[-1], Tendons.of(model).tension(data.ten_length, data.ctrl), atol=1e-9)
 
 
 @pytest.mark.parametrize("motors", [("motor2",), ("pan", "tilt"), ()])
@@ -245,6 +246,66 @@ def test_a_command_is_drawn_where_its_motor_did_not_follow(tmp_path: Path) -> No
     assert [each.name for each in mixed][1:3] == ["pan [mm]", "tilt [deg], command grey"]
 
 
+SIX = ("IR", "MR", "SR", "LR", "IO", "SO")
+ANTAGONISTS = [("IR", "SR"), ("MR", "LR"), ("IO", "SO")]  # anatomy
+
+
+@pytest.fixture(scope="module")
+def six() -> tuple[MujocoPlant, Trajectory]:
+    """MR winds up, LR lets go."""
+    plant = MujocoPlant(eye="six")
+    command = np.tile([motor.rest for motor in plant.motors], (2, 60, 1))
+    command[0, 5:] += [0, 10, 0, -10, 0, 0]
+    return plant, plant.move(command).trajectory()
+
+
+def test_antagonists_are_those_of_anatomy_and_other_eyes_have_none() -> None:
+    muscles = Muscles.of(build_model("six"))
+    assert muscles is not None
+    assert muscles.names == SIX
+    assert [tuple(SIX[i] for i in pair) for pair in muscles.pairs.tolist()] == ANTAGONISTS
+    for model in (build_model(), mujoco.MjModel.from_xml_string(OTHER_EYE)):
+        assert Muscles.of(model) is None
+
+
+def test_each_muscle_has_its_tension_and_its_name(six: tuple[MujocoPlant, Trajectory], tmp_path: Path) -> None:
+    plant, trajectory = six
+    path = record(tmp_path / "six.rrd", trajectory, model=plant.drawn())
+    verify(path)
+    root = "/saccades/0_saccade_0"
+    assert trajectory.tension is not None
+    for i, name in enumerate(SIX):
+        np.testing.assert_array_equal(scalars(path, f"{root}/tension/{name}")[1], trajectory.tension[0, :, i])
+    assert f"{root}/tension" not in entities(path)
+    (labels,) = column(path, f"{root}/scene/muscles", "Points3D:labels")[1]
+    assert tuple(labels) == SIX
+    _, places = column(path, f"{root}/scene/muscles", "Points3D:positions")
+    model = build_model("six")
+    data = mujoco.MjData(model)
+    data.joint("eye").qpos[:] = trajectory.orientation[0, 40]
+    mujoco.mj_forward(model, data)
+    middle = [(data.site(f"head_{name}").xpos + data.site(f"eye_{name}").xpos) / 2 for name in SIX]
+    np.testing.assert_allclose(places[40], middle, atol=1e-6)
+    sequence = record_sequence(tmp_path / "sequence.rrd", trajectory[[1, 0]], model=plant.drawn())
+    assert {"/sequence/scene/muscles", "/sequence/tension/SO"} <= entities(sequence)
+
+
+def test_antagonists_share_a_plot_on_the_scale_of_all(six: tuple[MujocoPlant, Trajectory]) -> None:
+    _, trajectory = six
+    assert trajectory.tension is not None
+    muscles = Muscles.of(build_model("six"))
+    every = curves.Curves(trajectory, [0, 1], trajectory.tension, SIX, muscles=muscles)
+    _, motors, tensions = ([plot for plot in every.plots() if plot.row == row] for row in (1, 2, 3))
+    assert [plot.name for plot in motors] == ["IR, SR [deg]", "MR, LR [deg]", "IO, SO [deg]"]
+    assert [plot.labels for plot in tensions] == ANTAGONISTS
+    assert {plot.span for plot in tensions} == {(0.0, trajectory.tension.max())}
+    compared = [plot.name for plot in every.compared()]
+    assert compared[-6:] == [f"{name} [deg]" for pair in zip(*ANTAGONISTS, strict=True) for name in pair]
+    at_rest = tension_colours(trajectory.tension[1, 0], np.ceil(trajectory.tension.max()))
+    assert np.ptp(at_rest.astype(int), axis=0).max() < 60  # pretension looks alike in all of them
+    assert not (at_rest == SLACK_COLOUR).all(axis=-1).any()
+
+
 def test_another_preset_draws_itself(tmp_path: Path) -> None:
     trajectory = horizontal(("motor1", "motor2", "motor3"), saccades=2)
     path = record(tmp_path / "v3.rrd", trajectory, model=build_model("eve_v3"))
@@ -272,7 +333,7 @@ def test_an_eye_nobody_thought_of_draws_itself(tmp_path: Path) -> None:
         mujoco.mj_forward(model, data)
         np.testing.assert_allclose(poses.position[1, row], data.xpos)
         np.testing.assert_allclose(poses.orientation[1, row], data.xquat)
-        np.testing.assert_allclose(poses.tension[1, row], tendon_tension(model, data.ten_length))
+        np.testing.assert_allclose(poses.tension[1, row], Tendons.of(model).tension(data.ten_length, data.ctrl))
         strips, tendon, counts = poses.strips(1, slice(row, row + 1))
         assert tendon.tolist() == [0, 1, 1]  # the pulley splits the second
         assert counts.tolist() == [3]

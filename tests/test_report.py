@@ -7,14 +7,20 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import altair
+import numpy as np
 import pytest
 
 from orient_eye.cli import main
 from orient_eye.errors import InputError
-from orient_eye.learning.policy import shipped_policies
+from orient_eye.learning.evaluation import Yardstick
+from orient_eye.learning.policy import Policy, shipped_policies
+from orient_eye.plants import make_plant
 from orient_eye.report import EXHIBITS, Evidence, chosen_figures, write_report
+from orient_eye.report.evidence import Judged
 from orient_eye.report.exhibit import Drawn
 from orient_eye.report.page import save_figure, write_page
+from orient_eye.search.optimum import Optimum
+from orient_eye.task.saccade import SaccadeTask
 
 OF_THESIS = ["2.2", "3.5", "3.6", "4.3", "4.4", "4.5", "4.6", "4.9", *(f"5.{n}" for n in range(1, 26))]
 QUICK = ("2.2", "4.9", "5.3", "5.10", "5.24")
@@ -95,6 +101,47 @@ def test_the_interactive_page_carries_its_script(evidence: Evidence, tmp_path: P
     links = Links()
     links.feed(text)
     assert not links.fetched
+
+
+@pytest.fixture(scope="module")
+def six(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, SaccadeTask]:
+    """A policy of the six-motor eye whose network of zeros acts as the usual command."""
+    task = SaccadeTask.of_case(make_plant("tavares", eye="six"), "smooth", targets="gaze")
+    size, place = len(task.actions.numbers), tmp_path_factory.mktemp("six")
+    Policy.of_task(task, (np.zeros((6, size)),), (np.zeros(size),), case="smooth").save(place)
+    return place, task
+
+
+def test_policies_of_other_eyes_stand_beside_each_other(six: tuple[Path, SaccadeTask]) -> None:
+    evidence = Evidence([six[0]], pairs=20)
+    assert evidence.names() == (*shipped_policies(), str(six[0]))
+    manifest = Policy.load("tavares-gaze").manifest
+    assert manifest["task"]["plant"]["eye"] == "thesis"
+    for eye, words in (("thesis", "--plant tavares --case"), ("six", "--plant tavares --eye six --case")):
+        with pytest.raises(InputError, match=words):
+            evidence.policy("tavares", "none", eye=eye)
+
+
+def test_six_motors_have_a_chapter(six: tuple[Path, SaccadeTask]) -> None:
+    """The optimum is not searched here: the usual command counts as the best."""
+    place, task = six
+    evidence, policy = Evidence([place]), Policy.load(place)
+    start, target = task.targets.draw(8, np.random.default_rng(0))
+    best = policy.act(start.orientation, target)
+    reward = task.perform(start, best, target).reward.total
+    pairs = Yardstick(task, start, target, Optimum(task.actions.as_plain(start, target, best), reward, 1))
+    evidence._judged[str(place)] = Judged(str(place), policy, pairs, pairs, {})
+    assert (
+        evidence.policy("tavares", "smooth", "gaze", eye="six").title
+        == f"tavares, eye six, case smooth, gaze ({place})"
+    )
+    says = {name: EXHIBITS[name].draw(evidence).says for name in EXHIBITS if name.startswith("six-")}
+    assert list(says) == ["six-tensions", "six-antagonists", "six-main-sequence", "six-listing"]
+    assert re.search(r"IR and SR -0\.9\d\d, MR and LR -0\.9\d\d, IO and SO -0\.9\d\d", says["six-antagonists"])
+    assert re.search(r"horizontal V0 = \d+ deg/s, .*; vertical V0 = \d+ deg/s", says["six-main-sequence"])
+    assert "Imposed on torsion: at rest all of it" in says["six-listing"]
+    spread, wanted = re.findall(r"by (\d\.\d\d) deg", says["six-listing"])
+    assert spread == wanted
 
 
 def test_unknown_figures_and_runs_that_are_none_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ from orient_eye.cli.predict import Predict
 from orient_eye.cli.sysid import Sysid
 from orient_eye.cli.train import Train
 from orient_eye.learning.policy import Policy
+from orient_eye.sysid import report
 from orient_eye.task.targets import saccades
 from rig_simulator import KINDS, TrueRig, draw_rig
 
@@ -27,7 +28,14 @@ SIZES_DEG = (5.0, 10.0, 20.0, 30.0, 40.0)
 QUICK = () if RIGS > 1 else ("--updates", "1500", "--evaluation-pairs", "6")
 
 
-pytestmark = pytest.mark.usefixtures("private_cache")
+pytestmark = pytest.mark.usefixtures("private_cache", *(() if RIGS > 1 else ("plain", "no_sysid_pictures")))
+
+
+@pytest.fixture
+def no_sysid_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of an identification; tests/test_prototype_road.py draws on its road."""
+    monkeypatch.setattr(report, "_pictures", lambda *_: [])
+    monkeypatch.setattr(report, "_recording", lambda *_: [])
 
 
 def ends(limit: float) -> tuple[np.ndarray, np.ndarray]:

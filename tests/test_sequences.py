@@ -160,6 +160,17 @@ def test_what_is_imposed_is_told_in_words(task: SaccadeTask) -> None:
     assert "by the actions nothing, they tell D outright" in imposed(task.plain)
 
 
+def test_where_motors_go_by_the_statics_listings_law_is_imposed_entirely() -> None:
+    six = SaccadeTask.of_case(make_plant("tavares", eye="six"), "smooth", targets="gaze", weights=WEIGHTS)
+    for task in (six, six.plain):
+        assert imposed(task).startswith("Imposed on torsion: at rest all of it. The actions tell B and k0;")
+        assert "of the least change of the motors from their pretension" in imposed(task)
+    made = make_sequence(six, sequences=2, saccades=4)
+    numbers = listing_numbers(made)
+    assert numbers["usual"] == pytest.approx(numbers["ends"], abs=0.01)  # fits of the statics: to 4e-4 deg
+    assert numbers["gaze_error_deg"]["largest"] < 0.01
+
+
 def test_torsion_of_the_shifts_is_what_the_motors_make_of_them(task: SaccadeTask) -> None:
     """Motors 1 and 3 of the thesis' eye by 5.74 deg each, against one another: 0.158 deg a degree each (spec)."""
     assert "straight ahead 1.8 deg of torsion" in imposed(task)

@@ -16,9 +16,10 @@ from scipy import signal
 from bad_files import write_pool
 from orient_eye import rotations
 from orient_eye.cli.sysid import Sysid
+from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.errors import InputError
-from orient_eye.motor import Motor, names
-from orient_eye.plants import PLANTS, make_plant
+from orient_eye.motor import Motor, names, rests
+from orient_eye.plants import PLANTS, make_plant, restore_plant
 from orient_eye.plants.simulated import Run, SimulatedPlant
 from orient_eye.rotations import to_euler
 from orient_eye.state import State
@@ -246,6 +247,86 @@ def test_a_plant_that_turns_vertically_only_is_identified() -> None:
     assert (found.surrogate.motor, found.surrogate.axis) == ("tilt", "pitch")
     assert (found.surrogate.K, found.surrogate.w0) == pytest.approx((0.8, 12.0), rel=1e-4)
     assert found.steps[2].motor_deg[[0, 100, -1]] == pytest.approx([0, 20, 40])
+
+
+@pytest.mark.parametrize(("pretension", "gain", "pole"), [(1.0, 0.635, 5.35), (2.0, 1.533, 2.146)])
+def test_a_pretensioned_eye_steps_from_where_its_motor_rests(pretension: float, gain: float, pole: float) -> None:
+    """The yaw gain of MR and the slow pole of the group's six-motor eye, as its equations have them linearised."""
+    plant = make_plant("tavares", eye="six", pretension=pretension)
+    found = identify_plant(plant, (-1.0, 1.0), held_out=(-2.0, 2.0), model="first_order_dead_time")
+    number, motor = found.surrogate, plant.motors[names(plant.motors).index("MR")]
+    assert (number.motor, number.axis, number.rest) == ("MR", "yaw", motor.rest)
+    assert (number.K, number.w0) == pytest.approx((gain, pole), rel=0.02)
+    assert found.steps[0].time[-1] == pytest.approx(0.8 if pretension == 1 else 1.4)  # three time constants
+    assert found.steps[0].motor_deg == pytest.approx(-1.0)
+    assert all(h.r_squared > 0.99 for h in found.held_out_fit)
+    assert number.source.startswith(f"steps of MR by -1, 1 deg from its rest at {motor.rest:.4g} deg on tavares (six")
+
+    lpf = make_plant("lpf", surrogate=number)
+    told = np.tile(rests(plant.motors), (1, 1001, 1))
+    told[:, 1:, names(plant.motors).index("MR")] += 2.0
+    true = plant.move(told).trajectory().yaw_deg
+    answer = lpf.move(told[..., names(plant.motors).index("MR")][..., None]).trajectory().yaw_deg
+    assert np.abs(answer - true).max() < 0.04 * true.max()
+
+
+def test_steps_from_which_the_eye_runs_away_are_told_and_not_fitted() -> None:
+    """28 deg to the left it is not stable at pretension 2: half as far 9 deg of motor are too much."""
+    plant = make_plant("tavares", eye="six", pretension=2.0)
+    found = identify_plant(plant, (-25.0, 5.0, 8.0, 10.0, 14.0, 90.0), held_out=(6.0, 40.0))
+    assert [s.name for s in found.steps] == ["-25 deg", "5 deg", "8 deg"]
+    assert [s.name for s in found.held_out] == ["6 deg"]
+    assert found.trajectory is not None
+    assert len(found.trajectory) == 3
+    told = "runs away from steps of MR by 10, 14, 40, 90 deg: it has no rest near where its gain has it"
+    assert any(told in warning for warning in found.warnings)
+    with pytest.raises(InputError, match=r"runs away from steps of MR by 10, 14 deg.*choose smaller steps"):
+        plant_steps(plant, (10.0, 14.0), motor="MR")
+    with pytest.raises(InputError, match=r"no step is left to fit.*runs away from steps of MR by 10 deg"):
+        identify_plant(plant, (10.0,), held_out=(2.0,))
+    with pytest.raises(InputError, match=r"from -169.* that is the mechanical range of MR from where it rests, at 112"):
+        identify_plant(plant, (-200.0,))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    rest=st.floats(-90, 90),
+    ends=st.lists(st.tuples(st.floats(-20, 20), st.floats(-20, 20)), min_size=1, max_size=4),
+    numbers=st.sampled_from([{"w0": 17.5}, {"wn": 21.0, "zeta": 0.4, "dead_time": 0.01}]),
+    limit=st.none() | st.floats(200, 400),
+)
+def test_a_surrogate_whose_motor_rests_elsewhere_is_the_same_eye(
+    rest: float, ends: list[tuple[float, float]], numbers: dict[str, float], limit: float | None
+) -> None:
+    number = Surrogate(1.3, **numbers, speed_limit=limit)  # type: ignore[arg-type]
+    one, other = (
+        make_plant("lpf", surrogate=replace(number, rest=at, range=(at - 70.0, at + 60.0))) for at in (0.0, rest)
+    )
+    F, D = np.array(ends).T[..., None]
+    moved, same = (p.move(PulseStep(F + r, F * 0 + 40.0, D + r, F * 0 + 15.0)) for p, r in ((one, 0.0), (other, rest)))
+    np.testing.assert_allclose(same.trajectory().yaw_deg, moved.trajectory().yaw_deg, atol=1e-9)
+    np.testing.assert_allclose(same.trajectory().motor - rest, moved.trajectory().motor, atol=1e-9)
+    np.testing.assert_allclose(same.measure().final, moved.measure().final, atol=1e-9)
+    np.testing.assert_allclose(same.energy(), moved.energy(), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(other.rest(D + rest), one.rest(D), atol=1e-12)
+    np.testing.assert_allclose(other.hold(one.rest(D), ("motor2",)), D + rest, atol=1e-9)
+    again = restore_plant(json.loads(json.dumps(other.identity())))
+    assert (again.identity(), again.motors) == (other.identity(), other.motors)
+    assert ("rest" in other.identity()) == bool(rest)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "told"),
+    [
+        ({"rest": float("nan")}, "rest must be a number from -1000000 to 1000000 deg"),
+        ({"rest": "57"}, "rest must be a number"),
+        ({"rest": 1e7}, "rest must be a number from -1000000 to 1000000 deg"),
+        ({"rest": 57.0, "range": (-30.0, 30.0)}, r"rests inside its range -30 to 30, got 57"),
+    ],
+)
+def test_a_rest_that_is_none_is_refused(numbers: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        Surrogate(1.0, 10.0, **numbers)
 
 
 class Vertical(SimulatedPlant):

@@ -83,7 +83,7 @@ def test_help_lists_it(command: str, give: Give) -> None:
         assert "spring" in text
     assert "--stiffness" in text
     if command in ("weights", "optimum", "train"):
-        assert "square" in text
+        assert "bell" in text
 
 
 def test_simulate_and_sysid(run: Run, tmp_path: Path) -> None:
@@ -99,15 +99,15 @@ def test_simulate_and_sysid(run: Run, tmp_path: Path) -> None:
 
 
 def test_weights_and_optimum(run: Run) -> None:
-    result = run("weights", "--plant", "spring", "--case", "square")
+    result = run("weights", "--plant", "spring", "--case", "bell")
     (row,) = result["cases"]
     assert all(row[name] > 0 for name in ("accuracy", "duration", "overshoot"))
-    result = run("optimum", "--plant", "spring", "--case", "square", "--start", "0", "--target", "20", "--check")
+    result = run("optimum", "--plant", "spring", "--case", "bell", "--start", "0", "--target", "20", "--check")
     assert result["passed"]
     assert result["saccades"][0]["final_yaw_deg"] == pytest.approx(20, abs=0.6)
     # Stiffer, so another plant, with weights and optimum of its own.
     other = run(
-        "optimum", "--plant", "spring", "--stiffness", "3500", "--case", "square", "--start", "0", "--target", "20"
+        "optimum", "--plant", "spring", "--stiffness", "3500", "--case", "bell", "--start", "0", "--target", "20"
     )
     assert not other["remembered"]
     assert other["task"]["plant"]["stiffness"] == 3500
@@ -115,7 +115,7 @@ def test_weights_and_optimum(run: Run) -> None:
 
 def test_train_predict_evaluate(run: Run) -> None:
     few = ("--updates", "30", "--saccades-per-update", "8", "--batch-size", "64", "--warmup", "64")
-    run("train", "--plant", "spring", "--case", "square", "--out", "run", "--evaluation-pairs", "2", *few)
+    run("train", "--plant", "spring", "--case", "bell", "--out", "run", "--evaluation-pairs", "2", *few)
     result = run("predict", "run", "--target", "20", "--command", "saccade.csv")
     assert result["plant"]["plant"] == "spring"
     assert not result["differs_from_training"]

@@ -42,13 +42,6 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without pictures and recording, which take longer than a tiny training."""
-    for what in ("figures.draw_learning", "figures.draw_policy", "stages.record_stages"):
-        monkeypatch.setattr(f"orient_eye.learning.{what}", lambda *_: None)
-
-
 def _numbers(folder: Path) -> dict[str, np.ndarray]:
     return safetensors.numpy.load_file(folder / "policy.safetensors")
 

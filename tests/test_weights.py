@@ -84,12 +84,13 @@ def resolved(task: SaccadeTask, chosen: ChosenSaccade) -> tuple[Any, Any]:
 def test_command_prints_the_table_of_an_independent_program(band: float) -> None:
     result = Weights(Problem(band=band)).run()
     assert [row["case"] for row in result["cases"]] == list(CASES)
-    *solved, human = result["cases"]
+    *solved, smooth, human = result["cases"]
     assert [row["case"] for row in solved] == list(SPECIFIED)
     assert human["how"].startswith("shipped" if band == 0.01 else "thesis 4.4.5")
-    for row in solved:
+    for row in (*solved, smooth):
         assert (row["B"], row["D"], row["k0"], row["energy"]) == (35.0, 20.33, 17.5, 1.0)
         assert row["how"] == "thesis 4.4.5"
+    for row in solved:
         wide, narrow = SPECIFIED[row["case"]]
         accuracy, duration = wide if band == 0.01 else narrow[:2]
         assert row["accuracy"] == pytest.approx(accuracy, rel=0.02)
@@ -147,7 +148,7 @@ def terms_by_sampling(case: str, actions: Array, band: float) -> Array:
     return np.stack([found[name] for name in ("accuracy", "energy", "duration", "overshoot")], axis=1)
 
 
-@pytest.mark.parametrize("case", SPECIFIED)
+@pytest.mark.parametrize("case", [*SPECIFIED, "smooth"])
 def test_gradient_vanishes_by_another_route(case: str) -> None:
     """Samples and quadrature instead of closed forms, and other steps in B and D (that of k0 matters)."""
     weights = solve_weights(lpf_task(case))
@@ -159,7 +160,7 @@ def test_gradient_vanishes_by_another_route(case: str) -> None:
     assert (np.abs(shares.sum(axis=1)) < 0.01 * np.abs(shares).max(axis=1)).all()
 
 
-@pytest.mark.parametrize("case", SPECIFIED)
+@pytest.mark.parametrize("case", [*SPECIFIED, "smooth"])
 @pytest.mark.parametrize("band", [0.01, 0.02])
 def test_chosen_saccade_is_optimal(case: str, band: float) -> None:
     """A simplex around it ends beside it: k0 a quarter to a third of a step below, as `Steps` says."""

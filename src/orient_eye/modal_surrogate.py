@@ -5,7 +5,8 @@
 
 The eye is told by its rotation vector v = 2 tan(theta / 2) n [deg], turned by theta about the unit vector n (twice that
 of Haustein 1989, so that for small turns it is the angle). Each of its components obeys an equation of its own,
-v_i' = w_i ((K tau)_i - v_i) or the one of second order: the thesis' low-pass filter (3.11) about x, y and z.
+v_i' = w_i ((K tau)_i - v_i) or the one of second order: the thesis' low-pass filter (3.11) about x, y and z. The
+positions tau of the motors count from where they rest.
 """
 
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye import listing
+from orient_eye.checks import real
 from orient_eye.errors import InputError
 from orient_eye.files import write_json
 from orient_eye.motor import Motor
@@ -27,7 +29,7 @@ Array = NDArray[np.float64]
 MODES = ("roll", "pitch", "yaw")
 """The axes x, y and z, in this order."""
 _FORMAT = "orient-eye modal surrogate 1"
-_WORKING_DEG = 40.0  # as of the motors of the eyes it stands for
+_WORKING_DEG = 40.0  # as of the arms of the eyes it stands for
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,7 @@ class ModalSurrogate:
         eye: the eye of ours that it stands for, a name of `orient_eye.eyes.EYES`; None for another.
         source: where it comes from, for people.
         details: what the identification found, plain values.
+        rest: where each motor stands when the eye looks straight ahead [deg], (motors,); () for 0.
 
     Raises:
         InputError: modes or gains that are missing, or numbers that make no stable eye.
@@ -85,6 +88,7 @@ class ModalSurrogate:
     eye: str | None = None
     source: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
+    rest: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if set(self.modes) != set(MODES):
@@ -97,12 +101,17 @@ class ModalSurrogate:
         ranges = None if self.ranges is None else tuple(ends("range", each, RANGE_DEG) for each in self.ranges)
         object.__setattr__(self, "ranges", ranges)
         object.__setattr__(self, "dead_time", number("dead_time", self.dead_time))
+        rest = tuple(real("rest", at, -RANGE_DEG, RANGE_DEG, unit="deg") for at in self.rest) or (0.0,) * len(
+            self.motors
+        )
+        object.__setattr__(self, "rest", rest)
         each = {axis: len(mode.K) for axis, mode in self.modes.items()}
         if ranges is not None:
             each["ranges"] = len(ranges)
+        each["rest"] = len(rest)
         if not self.motors or any(count != len(self.motors) for count in each.values()):
             raise InputError(f"a modal surrogate of {len(self.motors)} motors has as many of each number, got {each}")
-        self.as_motors()  # which checks the ranges
+        self.as_motors()  # which checks the ranges, and that the motors rest inside
 
     @property
     def K(self) -> Array:
@@ -110,10 +119,13 @@ class ModalSurrogate:
         return np.array([mode.K for mode in self.modes.values()])
 
     def as_motors(self) -> tuple[Motor, ...]:
-        """Its motors, (motors,); a policy may send them to 40 deg, as those of the eyes."""
+        """Its motors, (motors,); as of the eyes, a policy may send an arm to 40 deg, a wound spindle anywhere."""
         ranges = self.ranges or ((-np.inf, np.inf),) * len(self.motors)
-        working = (-_WORKING_DEG, _WORKING_DEG)
-        return tuple(Motor(name, "deg", each, working) for name, each in zip(self.motors, ranges, strict=True))
+        arm = (-_WORKING_DEG, _WORKING_DEG)
+        return tuple(
+            Motor(name, "deg", each, each if rest else arm, rest=rest)
+            for name, each, rest in zip(self.motors, ranges, self.rest, strict=True)
+        )
 
     def to_plain(self) -> dict[str, Any]:
         """Plain values; numbers that are not there are left out."""
@@ -124,7 +136,8 @@ class ModalSurrogate:
         ranges = None if self.ranges is None else [list(ends) for ends in self.ranges]
         told = {
             "motors": list(self.motors), "modes": modes, "ranges": ranges, "dead_time": self.dead_time or None,
-            "eye": self.eye, "source": self.source or None, "details": dict(self.details) or None,
+            "rest": list(self.rest) if any(self.rest) else None, "eye": self.eye, "source": self.source or None,
+            "details": dict(self.details) or None,
         }  # fmt: skip
         return {key: value for key, value in told.items() if value is not None}
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from orient_eye.errors import InputError
 
 Array = NDArray[np.float64]
+AXES = 3
+"""About which an eye turns."""
 
 
 @dataclass(frozen=True)
@@ -24,9 +26,10 @@ class Motor:
         working: where a policy may send it, inside the range.
         speed_limit: largest speed [unit/s]; None for none.
         acceleration_limit: largest acceleration [unit/s^2]; None for none.
+        rest: where it stands when the eye looks straight ahead at ease: 0, or its pretension.
 
     Raises:
-        InputError: a range or limit that is none.
+        InputError: a range or limit that is none, or a rest outside the range.
     """
 
     name: str
@@ -35,6 +38,7 @@ class Motor:
     working: tuple[float, float] = (-inf, inf)
     speed_limit: float | None = None
     acceleration_limit: float | None = None
+    rest: float = 0.0
 
     def __post_init__(self) -> None:
         low, high = self.range
@@ -42,6 +46,8 @@ class Motor:
         if any(math.isnan(end) for end in (*self.range, *self.working)) or not (low < high and inside[0] < inside[1]):
             raise InputError(f"motor {self.name!r}: a range goes from low to high, got {self.range}, {self.working}")
         object.__setattr__(self, "working", inside)
+        if not low <= self.rest <= high:
+            raise InputError(f"motor {self.name!r} rests inside its range {low:g} to {high:g}, got {self.rest:g}")
         for limit in (self.speed_limit, self.acceleration_limit):
             if limit is not None and not limit > 0:
                 raise InputError(f"motor {self.name!r}: a limit is positive, or None, got {limit}")
@@ -62,6 +68,16 @@ def names(motors: Sequence[Motor]) -> tuple[str, ...]:
 def ranges(motors: Sequence[Motor]) -> Array:
     """Mechanical ranges, (motors, 2)."""
     return np.array([motor.range for motor in motors], dtype=float).reshape(-1, 2)
+
+
+def rests(motors: Sequence[Motor]) -> Array:
+    """Where they stand when the eye looks straight ahead at ease, (motors,)."""
+    return np.array([motor.rest for motor in motors], dtype=float)
+
+
+def redundant(motors: Sequence[Motor]) -> bool:
+    """Whether they are more than the axes about which an eye turns: then they hold an orientation in many ways."""
+    return len(motors) > AXES
 
 
 def check_driven(motors: Sequence[Motor], driven: Sequence[str], plant: str) -> list[int]:

@@ -4,6 +4,11 @@
     held = Held.of(plant, cone(30.0))
     fit_plane(held.orientation).twist                # of Listing's plane of the fixations of least force
 
+Of an eye with more motors than axes, by a criterion of `orient_eye.plants.cables`:
+
+    Ends.of(cables_of(plant)).reach_deg              # up to which angle it stays, and its cables are taut
+    Postures.of(cables_of(plant), cone(30.0), "least-force", 1.0).motor
+
 All within the motors' working ranges. Left and up are those of `orient_eye.movement.oblique.seen_from`.
 """
 
@@ -15,10 +20,12 @@ from numpy.typing import NDArray
 from orient_eye import listing, rotations
 from orient_eye.checks import real
 from orient_eye.errors import InputError
-from orient_eye.motor import names
+from orient_eye.motor import names, rests
 from orient_eye.movement.oblique import toward
 from orient_eye.plants import Plant
-from orient_eye.plants.fixation import fixate, knows_elastics
+from orient_eye.plants.cables import CRITERIA, Cables, Holding
+from orient_eye.plants.elastic import ElasticPlant
+from orient_eye.plants.fixation import best_torsion, fixate, knows_elastics
 
 Array = NDArray[np.float64]
 _AHEAD = np.array([1.0, 0.0, 0.0])
@@ -28,6 +35,8 @@ _FARTHEST_DEG = 40.0  # of torsion, from that of least force
 _TURN = 0.5  # of a motor's unit, to either side
 _LEVELS = 5  # of each motor, at which it is looked how far the eye goes
 _POINTS = 14  # of a grid, from straight ahead to its edge
+_STRAIGHT = listing.with_torsion(_AHEAD[None], 0.0)
+_SIDEWAYS_DEG = np.arange(0.0, 90.1, 2.5)  # at which it is looked whether an eye with more motors than axes stays
 _FORCES = "choose plant mujoco, tavares or viscous"
 
 
@@ -96,6 +105,213 @@ class Workspace:
         return cls(far, shift, Held.of(plant, toward(shift).reshape(-1, 3)))
 
 
+def cables_of(plant: Plant) -> Cables | None:
+    """How a plant with more motors than axes shares the work; None for one that has nothing to share."""
+    plant = plant.twin() or plant
+    return plant.cables if isinstance(plant, ElasticPlant) and plant.redundant else None
+
+
+@dataclass(frozen=True)
+class Postures:
+    """How an eye with more motors than axes holds directions of gaze, by a criterion.
+
+    Attributes:
+        direction: unit vectors, (n, 3).
+        torsion: [deg], (n,).
+        motor: (n, motors).
+        cost: what the criterion makes of it, in its unit, (n,).
+        tension: [N], (n, tendons).
+        stiffness: by how much the cables turn the eye back [N m/rad], head frame, (n, 3, 3).
+        state: whether the eye stays there, and whether a cable hangs.
+    """
+
+    direction: Array
+    torsion: Array
+    motor: Array
+    cost: Array
+    tension: Array
+    stiffness: Array
+    state: Holding
+
+    @classmethod
+    def of(
+        cls,
+        cables: Cables,
+        direction: Array,
+        criterion: str = "least-change",
+        co_contraction: float | None = None,
+        torsion: Array | None = None,
+    ) -> "Postures":
+        """Of an eye that looks along directions (n, 3), also where it does not stay.
+
+        Args:
+            cables: of the eye.
+            direction: of gaze.
+            criterion: of `orient_eye.plants.cables.CRITERIA`.
+            co_contraction: mean angle of antagonists [rad], for a criterion that has one; None for their pretension.
+            torsion: [deg], (n,); None for the one that costs least.
+
+        Raises:
+            InputError: an unknown criterion, or a co-contraction that is none.
+        """
+        if torsion is None:
+            torsion = best_torsion(lambda tried: cables.posture(tried, criterion, co_contraction)[1], direction)
+        orientation = listing.with_torsion(direction, torsion)
+        motor, cost = cables.posture(orientation, criterion, co_contraction)
+        return cls(
+            direction,
+            torsion,
+            motor,
+            cost,
+            cables.tension(orientation, motor),
+            cables.stiffness(orientation, motor),
+            cables.state(orientation, motor, working(cables)),
+        )
+
+    @property
+    def orientation(self) -> Array:
+        """(n, 4)."""
+        return listing.with_torsion(self.direction, self.torsion)
+
+    def correlation(self, pairs: NDArray[np.intp]) -> Array:
+        """Of antagonists (pairs, 2) over the directions: their angles, and their tensions, (pairs, 2)."""
+        both = [[np.corrcoef(of[:, i], of[:, j])[0, 1] for i, j in pairs] for of in (self.motor, self.tension)]
+        return np.array(both).T
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where an eye with more motors than axes no longer holds its gaze, by a criterion, from the left over up.
+
+    Attributes:
+        unstable_deg: angle from straight ahead from which it would turn farther, (around,); infinite where it never
+            does before a cable hangs.
+        slack_deg: from which a cable hangs, (around,).
+        range_deg: from which a motor would leave its range, (around,).
+    """
+
+    unstable_deg: Array
+    slack_deg: Array
+    range_deg: Array
+
+    @classmethod
+    def of(cls, cables: Cables, criterion: str = "least-change", co_contraction: float | None = None) -> "Ends":
+        """As `Postures.of`.
+
+        Raises:
+            InputError: the eye does not even look straight ahead.
+        """
+        ahead = Postures.of(cables, _AHEAD[None], criterion, co_contraction)
+        if not ahead.state.good[0]:
+            raise InputError(
+                f"plant {cables.plant!r} does not look straight ahead by {criterion}: {ahead.state.fault(0)}; choose "
+                "less co-contraction, or another criterion"
+            )
+
+        def faults(away_deg: Array) -> NDArray[np.bool_]:
+            """Unstable, slack, out of range, at angles (..., around); (..., around, 3)."""
+            direction = toward(away_deg[..., None] * _around()).reshape(-1, 3)
+            state = Postures.of(cables, direction, criterion, co_contraction).state
+            slack = state.slack | ~state.balanced
+            found = np.stack([~slack & (state.stiffness <= 0), slack, ~state.inside], axis=-1)
+            return found.reshape(*away_deg.shape, 3)
+
+        tried = faults(np.repeat(_SIDEWAYS_DEG[:, None], _AROUND, axis=1))
+        first = tried.argmax(axis=0)
+        low, step = _SIDEWAYS_DEG[np.maximum(first - 1, 0)], float(_SIDEWAYS_DEG[1])
+        for _ in range(_HALVINGS - 3):
+            step /= 2
+            for kind in range(3):
+                there = faults(low[:, kind] + step)[:, kind]
+                low[:, kind] += np.where(there, 0.0, step)
+        low[~tried.any(axis=0)] = np.inf
+        return cls(*low.T)
+
+    @property
+    def reach_deg(self) -> Array:
+        """Up to which angle from straight ahead it holds its gaze, (around,)."""
+        return np.minimum(self._all.min(axis=0), _SIDEWAYS_DEG[-1])
+
+    @property
+    def cause(self) -> list[str]:
+        """What ends it, for people."""
+        words = np.array(["unstable", "a cable hangs", "a motor's range", "none up to 90 deg"])
+        return [str(each) for each in words[np.where(np.isinf(self._all.min(axis=0)), 3, self._all.argmin(axis=0))]]
+
+    def rings(self, count: int) -> Array:
+        """To the left and up [deg], (1 + count, around, 2): from straight ahead to where each way ends."""
+        return np.linspace(0, 1, count + 1)[:, None, None] * (self.reach_deg[:, None] * self.toward)
+
+    @property
+    def _all(self) -> Array:
+        return np.stack([self.unstable_deg, self.slack_deg, self.range_deg])
+
+    @property
+    def toward(self) -> Array:
+        """Unit vectors to the left and up, (around, 2)."""
+        return _around()
+
+
+@dataclass(frozen=True)
+class Softening:
+    """How stiff an eye with more motors than axes is straight ahead, at one co-contraction or another.
+
+    Attributes:
+        co_contraction: mean angle of antagonists [rad], (n,).
+        about: stiffness about x, y, z (torsion, pitch, yaw) [N m/rad], (n, 3).
+        least: about the axis where it is softest [N m/rad], (n,).
+    """
+
+    co_contraction: Array
+    about: Array
+    least: Array
+
+    @classmethod
+    def of(cls, cables: Cables, co_contraction: Array) -> "Softening":
+        """At co-contractions (n,) [rad], each pair wound up by as much.
+
+        Raises:
+            InputError: one that is none.
+        """
+        motor = np.concatenate(
+            [cables.posture(_STRAIGHT, "co-contraction", each)[0] for each in co_contraction.tolist()]
+        )
+        straight = np.repeat(_STRAIGHT, len(motor), axis=0)
+        about = np.diagonal(cables.stiffness(straight, motor), axis1=1, axis2=2)
+        return cls(co_contraction, np.asarray(about), cables.state(straight, motor).stiffness)
+
+    @property
+    def unstable_from(self) -> float:
+        """Co-contraction [rad] from which straight ahead is not stable; infinite where it always is."""
+        bad = np.flatnonzero(self.least <= 0)
+        if not bad.size or not bad[0]:
+            return -np.inf if bad.size else np.inf
+        at = slice(bad[0] - 1, bad[0] + 1)
+        return float(np.interp(0.0, -self.least[at], self.co_contraction[at]))
+
+
+def working(cables: Cables) -> Array:
+    """Working ranges of its motors, (motors, 2)."""
+    return np.array([motor.working for motor in cables.motors])
+
+
+def check_criterion(cables: Cables | None, criterion: str | None, co_contraction: float | None) -> None:
+    """Refuse what says nothing about an eye.
+
+    Raises:
+        InputError: a criterion of an eye that shares no work, or a co-contraction of a criterion that has none.
+    """
+    if cables is None:
+        if criterion is not None or co_contraction is not None:
+            raise InputError(
+                "a criterion, and a co-contraction, say how more motors than axes share the work; choose an eye that "
+                "has more (six), or leave them out"
+            )
+    elif co_contraction is not None and not CRITERIA[criterion or next(iter(CRITERIA))].co_contraction:
+        has = ", ".join(name for name in CRITERIA if CRITERIA[name].co_contraction)
+        raise InputError(f"the criterion {criterion or next(iter(CRITERIA))} has no co-contraction; choose {has}")
+
+
 def require_elastics(plant: Plant) -> None:
     """Refuse a plant whose fixations have no force, or that leaves no torsion open.
 
@@ -114,8 +330,8 @@ def require_elastics(plant: Plant) -> None:
 
 def degrees_per_motor(plant: Plant) -> Array:
     """By how much the resting eye turns about x, y, z (torsion, down, left) for a degree of each motor, (motors, 3)."""
-    moved = _TURN * np.eye(len(plant.motors))
-    ahead, behind = (rotations.rotation(plant.rest(side * moved)) for side in (1, -1))
+    moved, at = _TURN * np.eye(len(plant.motors)), rests(plant.motors)
+    ahead, behind = (rotations.rotation(plant.rest(at + side * moved)) for side in (1, -1))
     return np.asarray((ahead * behind.inv()).as_rotvec(degrees=True) / (2 * _TURN))
 
 

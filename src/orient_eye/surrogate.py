@@ -50,6 +50,7 @@ class Surrogate:
         intervals: 95 % confidence intervals of the numbers, by their name.
         amplitudes: least and largest step of the motor it was found from [deg].
         rig: the description of the rig (`orient_eye.rig.Rig.to_plain`), where there is one.
+        rest: where the motor stands when the eye looks straight ahead [deg]: K counts from there.
 
     Raises:
         InputError: numbers that make no stable eye.
@@ -71,6 +72,7 @@ class Surrogate:
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     amplitudes: tuple[float, float] | None = None
     rig: Mapping[str, Any] | None = None
+    rest: float = 0.0
 
     def __post_init__(self) -> None:
         for name in _BOUNDS:
@@ -88,12 +90,13 @@ class Surrogate:
                 object.__setattr__(self, name, ends(name, value, largest))
         intervals = {str(name): ends(f"intervals, {name},", value) for name, value in dict(self.intervals).items()}
         object.__setattr__(self, "intervals", intervals)
-        self.as_motor()  # which checks range and limits
+        object.__setattr__(self, "rest", real("rest", self.rest, -RANGE_DEG, RANGE_DEG, unit="deg"))
+        self.as_motor()  # which checks range, limits and rest
 
     def as_motor(self, working: tuple[float, float] = (-np.inf, np.inf)) -> Motor:
         """Its motor, with the limits that are known; `working` is where a policy may send it [deg]."""
         bounds = (-np.inf, np.inf) if self.range is None else self.range
-        return Motor(self.motor, "deg", bounds, working, self.speed_limit, self.acceleration_limit)
+        return Motor(self.motor, "deg", bounds, working, self.speed_limit, self.acceleration_limit, self.rest)
 
     def to_plain(self) -> dict[str, Any]:
         """Plain values; what is not given is left out."""

@@ -16,7 +16,7 @@ from orient_eye.cli.tables import number, say
 from orient_eye.commands.motor_file import Wiring, write_command, write_driver
 from orient_eye.constants import LONGEST_S
 from orient_eye.errors import InputError
-from orient_eye.motor import Motor, ranges
+from orient_eye.motor import Motor, ranges, rests
 from orient_eye.plants.limited_motor import follow, peaks
 
 if TYPE_CHECKING:
@@ -147,12 +147,12 @@ def at_drivers_rate(path: Array, final: Array, step_s: float, wiring: Wiring) ->
 
 
 def way_back(start: Array, motors: Sequence[Motor], step_s: float) -> Array:
-    """From where motors stand (motors,) to their rest at 0 by minimum jerk, within half their limits, (rows, motors).
+    """From where motors stand (motors,) to their rest by minimum jerk, within half their limits, (rows, motors).
 
     Source: Flash and Hogan 1985, 10 s^3 - 15 s^4 + 6 s^5.
     """
-    lasts = _BACK_S
-    for motor, way in zip(motors, np.abs(start), strict=True):
+    lasts, rest = _BACK_S, rests(motors)
+    for motor, way in zip(motors, np.abs(start - rest), strict=True):
         pace = min(_BACK_DEG_S, _SHARE * (motor.speed_limit or np.inf))
         lasts = max(lasts, _STEEPEST * way / pace)
         if motor.acceleration_limit:
@@ -160,7 +160,7 @@ def way_back(start: Array, motors: Sequence[Motor], step_s: float) -> Array:
     rows = int(np.ceil(lasts / step_s)) + 1
     share = np.linspace(0, 1, rows)[:, None]
     moved = share**3 * (10 - 15 * share + 6 * share**2)
-    return np.asarray((1 - moved) * start + moved * 0.0)
+    return np.asarray((1 - moved) * start + moved * rest)
 
 
 def write(path: Path, plant: "Plant", wiring: Wiring | None, positions: Array) -> Written:

@@ -2,9 +2,19 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
+
+if TYPE_CHECKING:
+    from orient_eye.commands.motor_file import WrittenCommand
+    from orient_eye.plants import Plant
+    from orient_eye.state import State
+
+_TURNED_AWAY_DEG = 60.0
+"""From straight ahead: an eye that is not stable near there comes to rest beyond this."""
+_TAUT_N = 1e-6
+"""A cable with less tension hangs slack."""
 
 
 @dataclass(frozen=True)
@@ -17,6 +27,11 @@ class Simulate:
     $ orient-eye simulate --motor command.csv
 
     $ orient-eye simulate --motor command.csv --plant tavares --gravity
+
+    Of the six-motor eye the columns are IR_deg, MR_deg, SR_deg, LR_deg, IO_deg, SO_deg, the angles of the spindles; a
+    motor without a column stands at its pretension (57.8, 56.2, 56.8, 58.4, 56.5, 58.1 deg).
+
+    $ orient-eye simulate --motor spindles.csv --eye six
 
     With --rig the motors have the rig's limits, and the file may have the columns of its driver (motor2_counts), as
     `orient-eye predict --rig` writes them.
@@ -38,7 +53,7 @@ class Simulate:
         """Simulate and write the run directory."""
         import numpy as np
 
-        from orient_eye.checks import likely_radians, real
+        from orient_eye.checks import real
         from orient_eye.cli.tables import say
         from orient_eye.commands.motor_file import read_command
         from orient_eye.constants import LONGEST_S, STEP_S
@@ -49,7 +64,6 @@ class Simulate:
         from orient_eye.recording import record
         from orient_eye.rotations import to_euler
         from orient_eye.run_directory import RunDirectory
-        from orient_eye.state import State
 
         if self.horizon is not None:
             real("--horizon", self.horizon, STEP_S, LONGEST_S, unit="s")
@@ -57,11 +71,11 @@ class Simulate:
         rig = self.plant_options.get("rig")
         wired = None if rig is None else wiring(plant, rig)
         command = read_command(self.motor, plant.motors, wired, horizon_s=self.horizon)
-        movement = plant.move(command, State(plant.rest(command.rest), command.rest), self.horizon)
+        if asked := _likely_radians(self.motor, plant, command):
+            say(f"note: {asked}", "yellow")
+        movement = plant.move(command, _at_rest(self.motor, plant, command), self.horizon)
         trajectory = movement.trajectory()
         run = RunDirectory.create(self.out, "simulate", self)
-        if asked := likely_radians(f"{self.motor}: the motor", float(np.abs(command.positions).max())):
-            say(f"note: {asked}", "yellow")
         trajectory.save_npz(run.path / "trajectory.npz")
         trajectory.to_csv(run.path / "trajectory.csv")
         draw_trajectory(trajectory, run.path / "trajectory.png")
@@ -107,6 +121,57 @@ class Simulate:
         _say_motors(motors, limited=bool(result["limited"]))
         say(f"in {run.path}: trajectory.csv, .npz, .png, .rrd (orient-eye view {run.path}/trajectory.rrd)")
         return result
+
+
+def _likely_radians(path: Path, plant: "Plant", command: "WrittenCommand") -> str:
+    """What to say of a command that is probably in radians; else nothing. Motors without a column say nothing."""
+    import numpy as np
+
+    from orient_eye.checks import likely_radians
+    from orient_eye.motor import ranges, rests
+
+    rest = rests(plant.motors)
+    told = command.positions[:, (command.positions != rest).any(axis=0)]
+    if not told.size:
+        return ""
+    largest = float(np.abs(told).max())
+    if rest.any() and largest < np.deg2rad(ranges(plant.motors).max()):  # spindles are wound up by turns
+        largest = float(np.ptp(told, axis=0).max())
+    return likely_radians(f"{path}: the motor", largest)
+
+
+def _at_rest(path: Path, plant: "Plant", command: "WrittenCommand") -> "State":
+    """Where the eye stands at the first row.
+
+    Raises:
+        InputError: of an eye that spindles turn, it is not stable there, or a cable hangs slack.
+    """
+    import numpy as np
+
+    from orient_eye.errors import InputError
+    from orient_eye.eyes.model import Tendons
+    from orient_eye.plants.elastic import ElasticPlant
+    from orient_eye.rotations import FORWARD, angle_between
+    from orient_eye.state import State
+
+    start = State(plant.rest(command.rest), command.rest)
+    if not isinstance(plant, ElasticPlant) or not (wound := Tendons.of(plant.model).wound != 0).any():
+        return start
+    ease = ", ".join(f"{motor.name} {motor.rest:.1f}" for motor in plant.motors)
+    away = float(angle_between(start.orientation[0], FORWARD))
+    if away > _TURNED_AWAY_DEG:
+        raise InputError(
+            f"{path}, first row: the eye would not stay near straight ahead, it turns away by {away:.0f} deg; wind "
+            f"the motors up less, or less apart: at ease they stand at {ease} deg"
+        )
+    tensions = plant.tension(start.orientation, start.motor)[0]
+    slack = [plant.tendons[i] for i in np.flatnonzero(wound & (tensions < _TAUT_N))]
+    if slack:
+        raise InputError(
+            f"{path}, first row: slack cables do not hold the eye: {', '.join(slack)}; begin with the motors "
+            f"wound up: at ease they stand at {ease} deg, as one does whose column is left out"
+        )
+    return start
 
 
 def _say_motors(motors: dict[str, dict[str, Any]], *, limited: bool) -> None:

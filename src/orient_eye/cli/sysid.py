@@ -58,7 +58,7 @@ class Sysid:
     """Plant to identify; not used with --recording."""
     plant_options: dict[str, Any] = field(default_factory=dict)
     amplitudes: Annotated[tuple[float, ...] | None, _default("1 2 3 ... 25", "AMPLITUDE ...")] = None
-    """Steps to fit, deg of motor."""
+    """Steps to fit, deg of motor from where it rests."""
     held_out: Annotated[tuple[float, ...] | None, _default("1.5 4.5 9.5 14.5 19.5 24.5", "AMPLITUDE ...")] = None
     """Steps to predict, not to fit, deg of motor. Recordings are left out one at a time instead."""
     recording: Annotated[
@@ -88,7 +88,7 @@ class Sysid:
     until: Annotated[float | None, _default("the whole recording")] = None
     """Leave out of recordings what comes after this time, s: a sensor that creeps long after the step."""
     all_motors: bool = False
-    """Identify a plant with all its motors: three linear modes, about roll, pitch and yaw."""
+    """Identify a plant with all its motors, three or more: three linear modes, about roll, pitch and yaw."""
     seed: Annotated[int | None, _default("0")] = None
     """Of the movements that --all-motors draws."""
     physical: bool = False
@@ -213,6 +213,7 @@ class Sysid:
 
 def _tell(found: "Identification", result: dict[str, Any]) -> None:
     from orient_eye.cli.tables import say
+    from orient_eye.plants.linear_response import second_order_poles
 
     say(_steps_table(found))
     say(_models_table(found))
@@ -230,6 +231,9 @@ def _tell(found: "Identification", result: dict[str, Any]) -> None:
         value, (low, high) = getattr(number, parameter.name), number.intervals.get(parameter.name, (nan, nan))
         unit = parameter.unit.removeprefix("deg/deg")
         told.append(f"{parameter.name} = {value:.5g} ± {(high - low) / 2:.2g} {unit}".rstrip())
+    if number.zeta is not None and number.zeta >= 1 and number.wn is not None:
+        slow, fast = second_order_poles(number.wn, number.zeta)
+        told[-1] += f", poles {slow:.4g} and {fast:.4g} rad/s"
     say(
         f"surrogate, {found.surrogate_model.title}: {', '.join(told)} (95 %); {number.motor} turns {number.axis}; in "
         f"{result['out']}/surrogate.json"

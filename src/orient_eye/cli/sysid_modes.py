@@ -52,6 +52,8 @@ def modes_of(command: "Sysid") -> dict[str, Any]:
         "orders": {name: each.to_plain()["modes"] for name, each in found.orders.items()},
         "rms_deg": found.rms_deg,
         "rings": found.rows,
+        "workspace_deg": found.workspace_deg,
+        "ran_away": found.ran_away,
         "files": [SURROGATE, REPORT, RESIDUALS, PICTURE],
     }
     run.write_json(REPORT, result)
@@ -80,8 +82,14 @@ def _tell(found: "ModesIdentification") -> None:
         "rms [deg]": column("rms_deg", ".2f"),
         "largest [deg]": column("largest_deg", ".1f"),
     }
-    title = f"Error on {len(found.held_out)} held-out pulse-steps, by gaze."
+    title = f"Error on {len(found.held_out)} held-out pulse-steps up to {found.workspace_deg:.3g} deg, by gaze."
     say(table(title, columns, found.rows, left=("order", "eccentricity [deg]")))
+    if found.ran_away:
+        say(
+            f"note: {found.ran_away} pulse-steps more ran away, to where the motors do not hold the eye; they are left "
+            "out of the fit and of these errors",
+            "yellow",
+        )
 
 
 def _ring(low: float, high: float | None) -> str:

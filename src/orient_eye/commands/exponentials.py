@@ -77,12 +77,25 @@ class ExponentialSum:
             modes.append(Mode(p, a))
         return Modes(tuple(modes)).through(poles)
 
+    def part(self, place: int) -> "ExponentialSum":
+        """The sums at one place of the last axis of the batch."""
+        return ExponentialSum(tuple(Term(x.c[..., place], x.n, x.p[..., place]) for x in self.terms))
+
     def __add__(self, other: "ExponentialSum") -> "ExponentialSum":
         return ExponentialSum(self.terms + other.terms)
 
     def scaled(self, factor: Array | float) -> "ExponentialSum":
         """The sum times a factor (...)."""
         return ExponentialSum(tuple(Term(x.c * factor, x.n, x.p) for x in self.terms))
+
+
+def overlap(a: ExponentialSum, b: ExponentialSum) -> Array:
+    """Integral over all time of the product of two sums, (...)."""
+    found: Array = np.zeros(())
+    for x in a.terms:
+        for y in b.terms:
+            found = found + x.c * y.c * factorial(x.n + y.n) / (x.p + y.p) ** (x.n + y.n + 1)
+    return found
 
 
 @dataclass(frozen=True)

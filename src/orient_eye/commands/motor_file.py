@@ -4,7 +4,7 @@
     plant.move(command)
 
 The first row is where the motors rest; between rows the command is a straight line, two rows at the same
-time are a jump. Motors whose columns are left out stay at 0.
+time are a jump. Motors whose columns are left out stand where they rest.
 
 With a `Wiring` the table is in the language of a rig's driver: its motors, units and rate.
 """
@@ -21,7 +21,7 @@ from orient_eye.commands import path_energy
 from orient_eye.constants import LONGEST_S
 from orient_eye.errors import InputError
 from orient_eye.files import write_table
-from orient_eye.motor import Motor, names
+from orient_eye.motor import Motor, names, rests
 from orient_eye.rig import Rig, RigMotor
 from orient_eye.tables import Table, read_table
 
@@ -79,8 +79,8 @@ class Wiring:
             speed = speed if speed is None or speed < row else np.floor(speed / row * (1 + 1e-12)) * row
             acceleration = acceleration if acceleration is None or acceleration < 4 * rows else acceleration - 2 * rows
         low, high = sorted(end / share for end in motor.range)
-        scaled = [None if limit is None else float(limit / abs(share)) for limit in (speed, acceleration)]
-        return Motor(name, "deg", (low, high), (low, high), *scaled)
+        speed, acceleration = (None if limit is None else float(limit / abs(share)) for limit in (speed, acceleration))
+        return Motor(name, "deg", (low, high), (low, high), speed, acceleration)
 
     def to_driver(self, positions: Array) -> dict[str, Array]:
         """The driver's columns, (rows,) each, for positions of the plant's motors (rows, motors) [deg].
@@ -121,11 +121,12 @@ def _counts(motor: RigMotor, numbers: Array) -> Array:
 def _narrowest(motors: Sequence[Motor]) -> Motor:
     """A motor that keeps the limits of all."""
     low, high = max(motor.range[0] for motor in motors), min(motor.range[1] for motor in motors)
-    limits: list[float | None] = []
-    for name in ("speed_limit", "acceleration_limit"):
-        known = [getattr(motor, name) for motor in motors if getattr(motor, name) is not None]
-        limits.append(min(known, default=None))
-    return Motor(motors[0].name, "deg", (low, high), (low, high), *limits)
+    speeds, accelerations = (
+        [limit for motor in motors if (limit := getattr(motor, name)) is not None]
+        for name in ("speed_limit", "acceleration_limit")
+    )
+    slowest, softest = min(speeds, default=None), min(accelerations, default=None)
+    return Motor(motors[0].name, "deg", (low, high), (low, high), slowest, softest)
 
 
 @dataclass(frozen=True)
@@ -224,12 +225,13 @@ def read_command(
     if asked := likely_milliseconds(len(time), lasts):
         raise InputError(f"{path}: {asked}")
     in_rigs = wiring is not None and (set(wiring.needed) & set(table.columns) or not set(own) & set(table.columns))
-    positions = _drivers(path, table, wiring) if wiring is not None and in_rigs else _plants(path, table, own)
+    positions = _drivers(path, table, wiring) if wiring is not None and in_rigs else _plants(path, table, motors)
     return WrittenCommand(time - time[0], positions)
 
 
-def _plants(path: str | Path, table: Table, columns: Mapping[str, int]) -> Array:
-    """Positions (rows, motors) from the plant's own columns."""
+def _plants(path: str | Path, table: Table, motors: Sequence[Motor]) -> Array:
+    """Positions (rows, motors) from the plant's own columns; a motor without one stands at its rest."""
+    columns = [motor.column for motor in motors]
     given = [name for name in table.columns if name != "t_s"]
     unknown = [name for name in given if name not in columns and not (_of_motor(name) and not table[name].any())]
     if unknown:
@@ -239,8 +241,8 @@ def _plants(path: str | Path, table: Table, columns: Mapping[str, int]) -> Array
         )
     if not set(given) & set(columns):
         raise InputError(f"{path} commands no motor; add a column, one of {', '.join(columns)}")
-    positions = np.zeros((len(table.lines), len(columns)))
-    for name, index in columns.items():
+    positions = np.tile(rests(motors), (len(table.lines), 1))
+    for index, name in enumerate(columns):
         if name in table:
             positions[:, index] = table[name]
     return positions

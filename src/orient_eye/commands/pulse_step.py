@@ -124,7 +124,7 @@ class PulseStep:
 
     def rate(self, t: ArrayLike) -> Array:
         """Motor speeds d tau/dt = p' + k0 p [deg/s], (saccades, time, motors)."""
-        return self._by_time(self.step[..., None] * self._rate_shape(_times(t)))
+        return self._by_time(self.step[..., None] * self.rate_shape(_times(t)))
 
     def energy(self) -> Array:
         """Integral of the squared motor speeds over all time and motors [deg^2/s], (saccades,); 4.35."""
@@ -137,7 +137,8 @@ class PulseStep:
         return self.position(step_s * np.arange(samples))
 
     @cached_property
-    def _rate_shape(self) -> ExponentialSum:
+    def rate_shape(self) -> ExponentialSum:
+        """The motor's speed where it goes 1 deg: rate(t) / (D - F), batch shape (saccades, motors)."""
         return self.shape.derivative() + self.shape.scaled(self.k0)
 
     @staticmethod

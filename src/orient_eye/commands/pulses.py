@@ -62,7 +62,8 @@ class Pulse:
 
 PULSES: Registry[Pulse] = Registry(
     "pulse",
-    {name: f"orient_eye.commands.thesis_pulses:VARIANT_{name}" for name in "123"},
+    {name: f"orient_eye.commands.thesis_pulses:VARIANT_{name}" for name in "123"}
+    | {"smooth": "orient_eye.commands.smooth_pulse:SMOOTH"},
     Pulse,
 )
 """Name to pulse."""

@@ -36,6 +36,7 @@ EYES: Registry[Eye] = Registry(
     {
         "thesis": Eye("the thesis' eye: three motors, six elastics", Path("eye3.xml")),
         "eve_v3": Eye("the group's second parameter set", Path("eye3.xml"), eve_v3),
+        "six": Eye("the group's cable eye: six motors, one for each muscle", Path("eye6.xml")),
     },
     Eye,
 )

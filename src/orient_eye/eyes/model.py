@@ -2,18 +2,21 @@
 
     model = build_model("eve_v3")                    # a name of `orient_eye.eyes.EYES`, or an MJCF file
     motors(model)                                    # what turns it, read from the model
+    Tendons.of(model)                                # what pulls it
 
 Constants are read from the compiled model, never written a second time.
 """
 
 import hashlib
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.checks import real
 from orient_eye.errors import InputError
 from orient_eye.eyes import EYES
 from orient_eye.files import read_bytes, unreadable
@@ -67,7 +70,11 @@ def build_model(
             raise InputError(f"the integration step must be between 0 and {longest:.2g} s, got {step_s} s")
         spec.option.timestep = step_s
         for motor in spec.actuators:
+            if motor.trntype == mujoco.mjtTrn.mjTRN_TENDON:
+                continue  # a spindle: it is where its control says
             # An arm stands where its control says one step later: `eye3.xml` has the reason.
+            if motor.biastype != mujoco.mjtBias.mjBIAS_AFFINE:
+                raise ValueError(f"motor {motor.name!r} on a joint is no `position` servo")
             armature, gear = float(_joint(spec, motor.target).armature), float(motor.gear[0])
             if not (0 < armature < np.inf and 0 < abs(gear) < np.inf):
                 raise ValueError(f"motor {motor.name!r} has armature {armature:g} and gear {gear:g}, not both above 0")
@@ -128,9 +135,12 @@ def _check_parts(model: mujoco.MjModel) -> None:
         model.sensor(name)
     for i in range(model.ntendon):
         model.sensor(f"length_{model.tendon(i).name}")
-    model.site("gaze"), model.site("centre_of_mass"), model.body("eye")
-    if not motors(model):
-        raise ValueError("it has no motor: no actuator of a joint")
+    model.site("gaze"), model.site("centre_of_mass")
+    if model.joint("eye").type != mujoco.mjtJoint.mjJNT_BALL or model.body("eye").quat[0] != 1:
+        raise ValueError("its body 'eye' must stand straight, without a quat or other turn, on a ball joint 'eye'")
+    if not len(_motor_ids(model)):
+        raise ValueError("it has no motor: no actuator of a joint or a tendon")
+    Tendons.of(model)
     endless = [name for name in _PHYSICS if not np.isfinite(getattr(model, name)).all()]
     if endless:
         raise ValueError(f"it holds NaN or infinity: {', '.join(endless)}")
@@ -154,6 +164,8 @@ def _add_gravity(spec: mujoco.MjSpec) -> None:
     # The thesis takes the inertia about the centre of rotation and the centre of mass off it, which
     # no rigid body allows (m r^2 alone exceeds that inertia): the weight is a force, not a mass.
     spec.worldbody.add_site(name="head")
+    for key in spec.keys:
+        key.ctrl = [*key.ctrl, 0.0]
     weight = float(spec.body("eye").mass) * STANDARD_GRAVITY
     spec.add_actuator(
         name="gravity",
@@ -168,25 +180,126 @@ def _add_gravity(spec: mujoco.MjSpec) -> None:
     )
 
 
-def motors(model: mujoco.MjModel) -> tuple[Motor, ...]:
-    """What turns the eye: the actuators of joints, in the order of `ctrl`; their controls are angles."""
-    joined = (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).nonzero()[0]
+def motors(model: mujoco.MjModel, pretension: float | None = None) -> tuple[Motor, ...]:
+    """What turns the eye: the actuators of joints and tendons, in the order of `ctrl`; their controls are angles.
+
+    A motor rests where a keyframe has it: the key `pretension_N` of a pretension N, or the model's first key.
+
+    Args:
+        model: compiled.
+        pretension: which key; None for the first.
+
+    Raises:
+        InputError: no such key.
+    """
     working = (-WORKING_RANGE_DEG, WORKING_RANGE_DEG)
+    rest = np.rad2deg(_rest_control(model, pretension))
     found = []
-    for i in joined:
+    for i in _motor_ids(model):
         low, high = np.rad2deg(model.actuator_ctrlrange[i]).tolist()
         limits = (low, high) if model.actuator_ctrllimited[i] else (-np.inf, np.inf)
-        found.append(Motor(model.actuator(i).name, "deg", limits, working))
+        of_arm = model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
+        found.append(Motor(model.actuator(i).name, "deg", limits, working if of_arm else limits, rest=float(rest[i])))
     return tuple(found)
 
 
-def tendon_tension(model: mujoco.MjModel, length: Array) -> Array:
-    """Tension [N] (..., tendons) of the elastics at these lengths [m]; they pull only (3.2)."""
-    return model.tendon_stiffness * np.maximum(length - model.tendon_lengthspring[:, 1], 0)
+def _motor_ids(model: mujoco.MjModel) -> NDArray[np.intp]:
+    return np.isin(model.actuator_trntype, (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_TENDON)).nonzero()[0]
+
+
+def pretensions(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Names N of its keys pretension_N."""
+    keys = (model.key(i).name for i in range(model.nkey))
+    return tuple(key.removeprefix(_PRETENSION) for key in keys if key.startswith(_PRETENSION))
+
+
+def _rest_control(model: mujoco.MjModel, pretension: float | None) -> Array:
+    """Of all actuators, (nu,)."""
+    if pretension is None:
+        return np.array(model.key_ctrl[0]) if model.nkey else np.zeros(model.nu)
+    known = pretensions(model)
+    these = f"choose one of {', '.join(known)}" if known else "its motors rest at 0; leave the pretension out"
+    told = f"{real('the pretension', pretension, advice=these):g}"
+    if told not in known:
+        raise InputError(f"the eye has no pretension {told}: {these}")
+    return np.array(model.key(f"{_PRETENSION}{told}").ctrl)
+
+
+@dataclass(frozen=True)
+class Tendons:
+    """What pulls the eye: tension = stiffness max(0, length + wound control - rest length), 3.2.
+
+    Attributes:
+        stiffness: [N/m], (tendons,).
+        rest_length: [m], (tendons,).
+        motor: whose spindle winds it up, as an index among `motors`, (tendons,); -1 where none does: an arm may pull.
+        wound: by how much, [m/rad], (tendons,).
+    """
+
+    stiffness: Array
+    rest_length: Array
+    motor: NDArray[np.intp]
+    wound: Array
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> "Tendons":
+        """Those of a model.
+
+        Raises:
+            ValueError: an actuator on a tendon that is no spindle: `eye6.xml` has the form.
+        """
+        stiffness, rest = model.tendon_stiffness.copy(), model.tendon_lengthspring[:, 1].copy()
+        motor, wound = np.full(model.ntendon, -1), np.zeros(model.ntendon)
+        for place, i in enumerate(_motor_ids(model)):
+            if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_TENDON:
+                continue
+            tendon, name, bias = int(model.actuator_trnid[i, 0]), model.actuator(i).name, model.actuator_biasprm[i]
+            if stiffness[tendon] or motor[tendon] >= 0:
+                pulled = model.tendon(tendon).name
+                raise ValueError(f"tendon {pulled!r} is wound up by motor {name!r}, and pulled otherwise as well")
+            if faults := _no_spindle(model, i):
+                raise ValueError(
+                    f"motor {name!r} on a tendon is no spindle: {'; '.join(faults)} (eye6.xml has the form)"
+                )
+            stiffness[tendon], rest[tendon] = -bias[1], bias[0] / -bias[1]
+            motor[tendon], wound[tendon] = place, model.actuator_gainprm[i, 0] / bias[1]
+        return cls(stiffness, rest, motor, wound)
+
+    def tension(self, length: Array, control: Array) -> Array:
+        """Tension [N] (..., tendons) at lengths [m] (..., tendons), the motors' controls at (..., motors) [rad]."""
+        stretch = length - self.rest_length
+        if self.wound.any():
+            stretch = stretch + self.wound * control[..., self.motor]
+        return self.stiffness * np.maximum(stretch, 0)
+
+
+def _no_spindle(model: mujoco.MjModel, i: int) -> list[str]:
+    """What is wrong with an actuator on a tendon."""
+    _, stiffness, damping = model.actuator_biasprm[i, :3]
+    gain, gear, (low, high) = model.actuator_gainprm[i, 0], model.actuator_gear[i, 0], model.actuator_forcerange[i]
+    fixed = model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_FIXED
+    affine = model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE
+    faults = {
+        "its gain must be fixed, -k r, and its bias affine, k l, -k, 0 (stiffness k, rest length l, radius r)": not (
+            fixed and affine
+        ),
+        f"its stiffness, -biasprm[1], must be above 0, got {-stiffness:g}": not stiffness < 0,
+        f"its damping, biasprm[2], must be 0, got {damping:g}": damping != 0,
+        "its gain is 0, so that it winds nothing up": gain == 0,
+        f"its gear must be 1, got {gear:g}": gear != 1,
+        "it has dynamics of its own": model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE,
+        f"it must pull and never push, forcerange {-_PULL:g} (or below) to 0, got {low:g} to {high:g}": not (
+            model.actuator_forcelimited[i] and high == 0 and low <= -_PULL
+        ),
+        "it needs a ctrlrange": not model.actuator_ctrllimited[i],
+    }
+    return [fault for fault, there in faults.items() if there]
 
 
 def pairs(model: mujoco.MjModel) -> NDArray[np.intp] | None:
     """The two elastics that each motor pulls against one another, (motors, 2); None where they are not pairs."""
+    if (model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON).any():
+        return None
     arms = [int(model.jnt_bodyid[model.actuator(motor.name).trnid[0]]) for motor in motors(model)]
     pulled: list[list[int]] = [[] for _ in arms]
     for tendon in range(model.ntendon):
@@ -198,6 +311,9 @@ def pairs(model: mujoco.MjModel) -> NDArray[np.intp] | None:
     return np.array(pulled) if all(len(each) == 2 for each in pulled) else None
 
 
+_PRETENSION = "pretension_"
+_IF_ANY = ("key_ctrl", "actuator_forcerange", "tendon_armature")  # later ones: an eye without them is the one it was
+_PULL = 1000.0  # N, that a spindle's actuator may pull at least: tensions never come to it
 _PHYSICS = (
     "body_parentid", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia",
     "jnt_type", "jnt_bodyid", "jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness", "dof_damping", "dof_armature",
@@ -218,5 +334,6 @@ def model_hash(model: mujoco.MjModel) -> str:
         "option": [option.timestep, option.integrator, option.disableflags, *option.gravity],
         **{name: getattr(model, name).ravel() for name in _PHYSICS},
     }
+    numbers |= {name: values for name in _IF_ANY if (values := getattr(model, name).ravel()).any()}
     text = "\n".join(f"{name} {' '.join(f'{x + 0.0:.12g}' for x in values)}" for name, values in numbers.items())
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -24,6 +24,8 @@ def figure_3_5(found: Identification) -> Figure:
     amplitude = np.array([s.amplitude_deg for s in found.steps])
     order = amplitude.argsort()
     chosen = {"K": found.surrogate.K, "w0": found.surrogate.w0}  # the latter None of second order
+    rest = found.surrogate.rest
+    where = f" from its rest at {rest:.4g} deg" if rest else ""
     labels = {"K": "K [deg of eye per deg of motor]", "w0": r"$\omega_0$ [rad/s]"}
     for axes, symbol in zip(figure.subplots(1, 2), labels, strict=True):
         estimates = [fits[0][symbol] for fits in found.fits]
@@ -38,7 +40,7 @@ def figure_3_5(found: Identification) -> Figure:
         told = chosen[symbol]
         if told is not None:
             axes.axhline(told, color=MODEL, ls="--", label=f"surrogate: {told:.4g}")
-        axes.set(xlabel="step amplitude [deg of motor]", ylabel=labels[symbol])
+        axes.set(xlabel=f"step amplitude [deg of motor{where}]", ylabel=labels[symbol])
         axes.ticklabel_format(useOffset=False)
         tidy(axes)
         axes.legend(frameon=False)

@@ -34,9 +34,10 @@ def draw_modes(found: ModesIdentification) -> Figure:
     left, right = bottom.subplots(1, 2)
     _by_eccentricity(left, found)
     _over_time(right, found)
+    left_out = f"; {found.ran_away} more, fitted or held out, ran away" if found.ran_away else ""
     top.suptitle(
         f"Held-out pulse-steps of all motors: plant (solid) and surrogate (dashed); {len(error)} of them, "
-        f"rms {found.rms_deg[found.order]:.2f} deg, largest {error.max():.1f} deg"
+        f"rms {found.rms_deg[found.order]:.2f} deg, largest {error.max():.1f} deg{left_out}"
     )
     return figure
 

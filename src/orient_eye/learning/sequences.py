@@ -19,7 +19,7 @@ from orient_eye import listing, rotations
 from orient_eye.errors import InputError
 from orient_eye.learning.directions import angles_toward
 from orient_eye.learning.evaluation import Act
-from orient_eye.motor import names, ranges
+from orient_eye.motor import names, ranges, redundant
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.oblique import (
     component_correlation,
@@ -33,6 +33,7 @@ from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants.fixation import Fixations, knows_elastics
 from orient_eye.state import State
 from orient_eye.statics import degrees_per_motor
+from orient_eye.task.generator_actions import GeneratorActions
 from orient_eye.task.residual_actions import ResidualActions
 from orient_eye.task.saccade import Outcome, SaccadeTask
 from orient_eye.task.table import outcome_columns
@@ -173,7 +174,8 @@ def listing_numbers(made: Sequence) -> dict[str, Any]:
 
     `ends` and `on_the_way` (all samples up to the settling times) are planes through orientations, as
     `orient_eye.listing.Plane`; `least_force` and `fick` are those of the same directions of gaze with these torsions;
-    `usual` that of the usual command alone (None where the actions have none), `first` how it came about.
+    `usual` that of the usual command alone (None where the actions have none; of actions that take D from the statics
+    what these impose), `first` how it came about.
 
     Raises:
         InputError: fewer than eight saccades.
@@ -181,7 +183,8 @@ def listing_numbers(made: Sequence) -> dict[str, Any]:
     ends, gaze = made.measures.final, rotations.gaze(made.measures.final)
     if len(ends) < FEWEST:
         raise InputError(f"a plane and its twist need {FEWEST} saccades or more, got {len(ends)}")
-    surface, usual = least_force(made.task), made.task.actions
+    surface, actions = least_force(made.task), made.task.actions
+    usual = actions.fixations if isinstance(actions, (ResidualActions, GeneratorActions)) else None
     off = np.full(len(ends), np.nan) if surface is None else listing.torsion(ends) - surface.torsion(gaze)
     blip, deviation = (of(made.trajectory, made.measures) for of in (torsion_blip, path_deviation))
     correlation = component_correlation(made.trajectory, made.measures)
@@ -193,7 +196,7 @@ def listing_numbers(made: Sequence) -> dict[str, Any]:
         "ends": _plane(ends),
         "on_the_way": _plane(on_the_way(made)),
         "least_force": None if surface is None else _plane(surface.orientation(gaze)),
-        "usual": _plane(usual.fixations.orientation(aims)) if isinstance(usual, ResidualActions) else None,
+        "usual": None if usual is None else _plane(usual.orientation(aims)),
         "fick": _plane(listing.with_torsion(gaze, listing.ficks_torsion(gaze))),
         "beside_least_force_deg": None if surface is None else _told(off, mean=np.mean, sd=np.std),
         "first": _first(made, off),
@@ -267,6 +270,12 @@ def imposed(task: SaccadeTask) -> str:
     )
     if task.judge == "orientation":
         judged = "the reward wants the target's whole orientation, torsion too"
+    if isinstance(actions, GeneratorActions):
+        return (
+            "Imposed on torsion: at rest all of it. The actions tell B and k0; the motors go where the statics hold "
+            f"the target, at the torsion {_rule(task)}. So Listing's law at rest is that of the statics, and nothing "
+            "of it is learned, whatever the reward says of it."
+        )
     if not isinstance(actions, ResidualActions):
         return f"Imposed on torsion: by the actions nothing, they tell D outright; {judged}."
     shift = {number.motor: number.high for number in actions.numbers if number.symbol == "D_shift"}
@@ -275,12 +284,19 @@ def imposed(task: SaccadeTask) -> str:
         shift[name] / abs(by) for name, by in zip(names(task.plant.motors), turn, strict=True) if abs(by) > _PULLS
     )
     told = ", ".join(f"{name} {high:.3g}" for name, high in shift.items())
-    rule = actions.rule or ("least force" if elastics else "listing")  # `orient_eye.plants.fixation.fixate`
     return (
         "Imposed on torsion: the policy's actions are told from a usual command, which holds the target at the torsion "
-        f"{_RULES[rule]}, and may shift its D by up to {told} deg to either side, straight ahead {worth:.2g} "
+        f"{_rule(task)}, and may shift its D by up to {told} deg to either side, straight ahead {worth:.2g} "
         f"deg of torsion; {judged}."
     )
+
+
+def _rule(task: SaccadeTask) -> str:
+    """With which torsion the actions hold targets, as `orient_eye.plants.fixation.fixate` does, in words."""
+    rule = getattr(task.actions, "rule", None) or ("least force" if knows_elastics(task.plant) else "listing")
+    if rule == "least force" and redundant(task.plant.motors):
+        return "of the least change of the motors from their pretension"
+    return _RULES[rule]
 
 
 def least_force(task: SaccadeTask) -> Fixations | None:

@@ -119,7 +119,7 @@ class Plant(Protocol):
     def hold(self, orientation: Array, driven: tuple[str, ...]) -> Array:
         """Positions (saccades, motors) at which the eye rests in these orientations (saccades, 4).
 
-        Only the driven motors move, the others stand at 0; the inverse of `rest`.
+        Only the driven motors move, the others stand at their rest; the inverse of `rest`.
 
         Raises:
             InputError: an orientation that the driven motors cannot hold.
@@ -131,9 +131,10 @@ class Plant(Protocol):
         ...
 
     def force(self, orientation: Array, motor: Array) -> Array | None:
-        """Of fixations: the sum over pairs of elastics of the squared difference of their tensions [N^2], (saccades,).
+        """Of fixations: what it costs to hold them, (saccades,); None for a plant whose elastics are not known.
 
-        None for a plant whose elastics are not known.
+        Where each motor pulls a pair of elastics the sum over pairs of the squared difference of their tensions [N^2];
+        where there are more motors than axes the sum of the motors' squared changes from their pretension [rad^2].
 
         Args:
             orientation: of eyes at rest, (saccades, 4).
@@ -195,6 +196,7 @@ class PlantKind:
 _EYE = Option("eye", str, "thesis", f"Preset of the eye ({', '.join(EYES)}), or an MJCF file of the same form.")
 _RIG = Option("rig", str, None, "Limits of its motors: a rig's TOML file, or a shipped one (prototype).")
 _GRAVITY = Option("gravity", bool, False, "With the gravity torque.")
+_PRETENSION = Option("pretension", float, None, "Of an eye that has several: 1 or 2 of six.")
 
 PLANTS: Registry[PlantKind] = Registry(
     "plant",
@@ -215,6 +217,7 @@ PLANTS: Registry[PlantKind] = Registry(
                 _EYE,
                 Option("accurate", bool, False, "Integrate at 0.2 ms instead of the thesis' 1 ms."),
                 _GRAVITY,
+                _PRETENSION,
                 _RIG,
             ),
         ),
@@ -226,13 +229,14 @@ PLANTS: Registry[PlantKind] = Registry(
                 Option("accurate", bool, False, "Integrate by Runge-Kutta's method instead of the thesis' Euler step."),
                 _GRAVITY,
                 Option("as_published", bool, False, "The author's program to the letter."),
+                _PRETENSION,
                 _RIG,
             ),
         ),
         "viscous": PlantKind(
             "the eye without its inertia, compiled: a non-linear surrogate",
             "orient_eye.plants.viscous:ViscousPlant",
-            (_EYE, _GRAVITY, _RIG),
+            (_EYE, _GRAVITY, _PRETENSION, _RIG),
         ),
         "modal": PlantKind(
             "three low-pass surrogates in parallel, for all motors",

@@ -8,14 +8,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
 from orient_eye.eyes.elastics import Elastics
 from orient_eye.eyes.model import STANDARD_GRAVITY
-from orient_eye.motor import names
 from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.limits import Limits
 from orient_eye.rig import Rig
@@ -31,21 +29,22 @@ class CompiledPlant(ElasticPlant):
 
     Args:
         options: keywords of the plant, which its identity shows: `eye` and `gravity` among them.
+        pretension: at which its motors rest, of those that it has keyframes for.
         rig: whose motors limit those of the same names: a TOML file, a shipped rig, or the limits by motor.
         threads: that share a batch; 0 for one a core.
 
     Raises:
-        InputError: unknown eye or rig, tendons on another kind of path, a number of threads that is none, or no Numba.
+        InputError: unknown eye, pretension or rig, tendons on another kind of path, a number of threads that is none,
+            or no Numba.
     """
 
-    def __init__(self, options: dict[str, Any], *, rig: Rig | Limits | str | Path | None, threads: int) -> None:
+    def __init__(
+        self, options: dict[str, Any], *, pretension: float | None, rig: Rig | Limits | str | Path | None, threads: int
+    ) -> None:
         self._kernel = self._compiled()
-        super().__init__(options, step_s=self.step_s, threads=threads, rig=rig)
+        super().__init__(options, step_s=self.step_s, threads=threads, pretension=pretension, rig=rig)
         self.elastics = Elastics.from_model(self.model)
-        motors = [self.model.actuator(name) for name in names(self.motors)]
-        self._per_control = np.deg2rad(1) / np.array([motor.gear[0] for motor in motors])  # joint position a deg
-        slides = [self.model.jnt_type[motor.trnid[0]] == mujoco.mjtJoint.mjJNT_SLIDE for motor in motors]
-        self._weightless = self._eye(np.array(slides))
+        self._weightless = self._eye()
         pull = -self.elastics.mass * STANDARD_GRAVITY if options["gravity"] else 0
         weight = np.array([self.elastics.centre_of_mass, [0, 0, pull]])
         self._weighed = self._weightless._replace(weight=weight)
@@ -62,10 +61,10 @@ class CompiledPlant(ElasticPlant):
             ) from error
         return import_module("orient_eye.plants.elastic_kernel")
 
-    def _eye(self, slides: NDArray[np.bool_]) -> Any:
+    def _eye(self) -> Any:
         """The kernel's, without weight; its lines are the elastics here."""
         e = self.elastics
-        centre, axis, sliding = e.arm_centre[e.motor], e.arm_axis[e.motor], slides[e.motor, None]
+        centre, axis, sliding = e.arm_centre[e.motor], e.arm_axis[e.motor], e.slides[e.motor, None]
         along = (axis * e.arm_end).sum(axis=1, keepdims=True) * axis
         arm = np.stack(
             [
@@ -75,14 +74,16 @@ class CompiledPlant(ElasticPlant):
             ],
             axis=1,
         )
+        wound = e.wound != 0
+        arm[wound, 0] = e.via[wound]  # nothing of the cable lies behind it but what is wound up
         return self._kernel.Eye(
             insertion=np.array(e.insertion),
             via=np.array(e.via),
             arm=arm,
-            elastic=np.stack([e.stiffness, e.rest_length], axis=1),
-            pulls=np.searchsorted(np.sort(e.motor), np.arange(len(slides) + 1)),
+            elastic=np.stack([e.stiffness, e.rest_length, e.wound], axis=1),
+            pulls=np.searchsorted(np.sort(e.motor), np.arange(len(e.slides) + 1)),
             pulled=np.argsort(e.motor, kind="stable"),
-            slides=slides,
+            slides=e.slides,
             inertia=np.stack([e.inertia, np.linalg.inv(e.inertia)]),
             friction=e.friction,
             weight=np.zeros((2, 3)),
@@ -108,7 +109,7 @@ class CompiledPlant(ElasticPlant):
     def _still(self, eye: Any, turn: Array, motor: Array) -> tuple[Array, Array]:
         torque, tension = np.empty((len(motor), 3)), np.empty((len(motor), len(self.elastics.motor)))
         turns = np.require(np.broadcast_to(turn, (len(motor), 3, 3)), float, ["C", "W"])
-        self._kernel.still(eye, turns, motor * self._per_control, torque, tension)
+        self._kernel.still(eye, turns, motor * self.elastics.per_degree, torque, tension)
         return torque, tension
 
     def _in_slices(self, saccades: int, torques: int, move: Callable[[slice], None]) -> None:

@@ -7,14 +7,14 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from orient_eye.cached import cached_property
 from orient_eye.checks import whole
 from orient_eye.constants import HORIZON_S
 from orient_eye.eyes import model as eyes
-from orient_eye.motor import check_driven, ranges
+from orient_eye.motor import AXES, check_driven, ranges, redundant, rests
 from orient_eye.plants import PulseRates, equilibrium
+from orient_eye.plants.cables import Cables
 from orient_eye.plants.fixation import Fixations
 from orient_eye.plants.limits import Limits, are_limited, limited, limits_of, travel_s
 from orient_eye.plants.simulated import SimulatedPlant
@@ -23,7 +23,6 @@ from orient_eye.rotations import gaze, rotation
 
 Array = NDArray[np.float64]
 _MOST_THREADS = 1024
-_TURN = 1e-4  # rad, of the difference quotients of the torque
 
 
 class ElasticPlant(SimulatedPlant):
@@ -34,10 +33,12 @@ class ElasticPlant(SimulatedPlant):
         step_s: of the integration.
         threads: that share a batch; 0 for one a core.
         gravity: with the gravity torque as an actuator of the model.
+        pretension: at which its motors rest, of those that the eye has keyframes for; None for the first, or 0.
         rig: whose motors limit those of the same names, or its limits in plain values; the identity then shows them.
 
     Raises:
-        InputError: an eye, a rig or a number of threads that is none, or a rig's motor that the eye has not.
+        InputError: an eye, a pretension, a rig or a number of threads that is none, or a rig's motor that the eye has
+            not.
     """
 
     resumes = True
@@ -49,11 +50,14 @@ class ElasticPlant(SimulatedPlant):
         step_s: float,
         threads: int = 0,
         gravity: bool = False,
+        pretension: float | None = None,
         rig: Rig | Limits | str | Path | None = None,
     ) -> None:
         self.threads = whole("threads", threads, 0, _MOST_THREADS, advice="0 is one a core")
         self.model = eyes.build_model(options["eye"], step_s=step_s, gravity=gravity, visual=False)
-        own = eyes.motors(self.model)
+        own = eyes.motors(self.model, pretension)
+        if own != eyes.motors(self.model):  # one eye, one identity
+            options = {**options, "pretension": pretension}
         limits = {} if rig is None else limits_of(rig, own, self.name)
         self.motors = limited(own, limits)
         self.options = {**options, "rig": limits} if limits else options
@@ -82,6 +86,8 @@ class ElasticPlant(SimulatedPlant):
 
     def force(self, orientation: Array, motor: Array) -> Array | None:
         """See `orient_eye.plants.Plant`."""
+        if self.redundant:
+            return np.asarray((np.deg2rad(motor - rests(self.motors)) ** 2).sum(axis=1))
         if self._pairs is None:
             return None
         tension = self.tension(orientation, motor)
@@ -101,6 +107,16 @@ class ElasticPlant(SimulatedPlant):
     def _pairs(self) -> NDArray[np.intp] | None:
         return eyes.pairs(self.model)
 
+    @property
+    def redundant(self) -> bool:
+        """Whether it has more motors than axes, so that they hold an orientation in many ways."""
+        return redundant(self.motors)
+
+    @cached_property
+    def cables(self) -> Cables:
+        """How motors that are more than the axes share the work."""
+        return Cables(self.name, self.motors, self.torque, self.tension)
+
     def identity(self) -> dict[str, Any]:
         """Name, options and hash of the compiled model."""
         return {"plant": self.name, **self.options, "model": self._model_hash}
@@ -116,7 +132,7 @@ class ElasticPlant(SimulatedPlant):
     def motor_rates(self) -> Array:
         """See `orient_eye.plants.Plant`."""
         poles, ways = self._modes
-        moved = self.rest(np.concatenate([np.zeros((1, len(self.motors))), np.eye(len(self.motors))]))
+        moved = self.rest(rests(self.motors) + np.eye(len(self.motors) + 1, len(self.motors), -1))
         turned = (rotation(moved[1:]) * rotation(moved[0]).inv()).as_rotvec().T
         parts = np.linalg.solve(ways, np.concatenate([turned, np.zeros_like(turned)]))
         shares = np.linalg.norm(ways[:3], axis=0)[:, None] * np.abs(parts)
@@ -125,12 +141,9 @@ class ElasticPlant(SimulatedPlant):
     @cached_property
     def _modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Poles [1/s] (6,) of the eye linearised at rest and its modes, turn and speed [rad, rad/s] (6, poles)."""
-        at = np.zeros((1, len(self.motors)))
+        at = rests(self.motors)[None]
         rest = self.rest(at)
-        turns = np.concatenate([np.eye(3), -np.eye(3)]) * _TURN
-        turned = (Rotation.from_rotvec(turns) * rotation(np.repeat(rest, 6, axis=0))).as_quat(scalar_first=True)
-        torque = self.torque(turned, np.repeat(at, 6, axis=0))
-        stiffness = -(torque[:3] - torque[3:]).T / (2 * _TURN)
+        stiffness = equilibrium.stiffness(self.torque, rest, at)[0]
         inertia, friction = self._inertia_and_friction(rest[0])
         still, unit = np.zeros((3, 3)), np.eye(3)
         motion = np.block([[still, unit], [-np.linalg.solve(inertia, stiffness), -np.linalg.solve(inertia, friction)]])
@@ -158,16 +171,20 @@ class ElasticPlant(SimulatedPlant):
 
     def rest(self, motor: Array) -> Array:
         """See `orient_eye.plants.Plant`."""
-        return equilibrium.rest_orientation(self.torque, motor)
+        return equilibrium.rest_orientation(self.torque, motor, rests(self.motors))
 
     def held(self, orientation: Array, driven: tuple[str, ...]) -> Array:
         """See `orient_eye.plants.Plant`."""
         index = check_driven(self.motors, driven, self.name)
         working = np.array([motor.working for motor in self.motors])
-        motor, held = equilibrium.held_motor(self.torque, orientation, len(self.motors), index, working)
+        if len(index) > AXES:
+            return self.cables.held(orientation, index, working)
+        motor, held = equilibrium.held_motor(self.torque, orientation, rests(self.motors), index, working)
         return np.where(held[:, None], motor, np.nan)
 
     def hold(self, orientation: Array, driven: tuple[str, ...]) -> Array:
         """See `orient_eye.plants.Plant`."""
         index = check_driven(self.motors, driven, self.name)
-        return equilibrium.rest_motor(self.torque, orientation, len(self.motors), index, ranges(self.motors))
+        if len(index) > AXES:
+            return self.cables.hold(orientation, index, ranges(self.motors))
+        return equilibrium.rest_motor(self.torque, orientation, rests(self.motors), index, ranges(self.motors))

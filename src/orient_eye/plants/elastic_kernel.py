@@ -24,6 +24,8 @@ STATIC_FRICTION = 0.006
 """N m, in the author's program, while the eye turns slower than `STATIC_SPEED`."""
 STATIC_SPEED = 1e-5
 """rad/s."""
+CABLE_FRICTION, CABLE_SPEED = 0.005, 0.01
+"""The same in the programs of the eye that spindles turn: N m, with viscous friction; rad/s."""
 _DIVERGED = 1e4  # rad/s: a thousand times the fastest saccade
 _SMALL = 0.0625  # of a squared half angle, up to which these series are exact to rounding
 _COS = tuple((-1.0) ** n / math.factorial(2 * n) for n in range(1, 7))
@@ -39,16 +41,17 @@ class Eye(NamedTuple):
     """What pulls an eye, and what it is, in head coordinates.
 
     The end of an elastic's arm is at base + u first + v second. Of a hinge u, v are cosine and sine of its angle; of
-    a spindle, whose arm slides, v is how far.
+    an arm that slides u is 0, and v is how far. A spindle has no arm: its cables' via point stands for it, and it winds
+    them up by `wound` times its angle.
 
     Attributes:
         insertion: of the elastics on the eye, eye coordinates [m], (elastics, 3).
         via: fixed via point [m], (elastics, 3); NaN where there is none.
         arm: base, first and second, (elastics, 3, 3).
-        elastic: stiffness [N/m] and rest length [m], (elastics, 2).
+        elastic: stiffness [N/m], rest length [m], and how much of it a spindle winds up [m/rad], (elastics, 3).
         pulls: where in `pulled` each motor's elastics begin, and the last one's end, (motors + 1,).
         pulled: elastics, one motor's after the other's, (elastics,).
-        slides: whether a motor is a spindle, (motors,).
+        slides: whether a motor's arm goes along a line, (motors,).
         inertia: and its inverse, eye coordinates, (2, 3, 3).
         friction: [N m s/rad].
         weight: where it pulls, eye coordinates [m], and how [N], head coordinates, (2, 3).
@@ -172,7 +175,7 @@ def _stand(eye: Eye, motor: Array, at: Array, end: Array, behind: Array) -> None
                 end[t, 0], end[t, 1], end[t, 2] = x, y, z
             else:
                 d = x - eye.via[t, 0], y - eye.via[t, 1], z - eye.via[t, 2]
-                behind[t] = math.sqrt(_dot(d, d))
+                behind[t] = math.sqrt(_dot(d, d)) + eye.elastic[t, 2] * motor[m]
                 end[t, 0], end[t, 1], end[t, 2] = eye.via[t, 0], eye.via[t, 1], eye.via[t, 2]
 
 
@@ -213,6 +216,16 @@ def _published(eye: Eye, turn: Matrix, omega: Vector, torque: Vector) -> Vector:
     c = eye.friction
     resisted = _times(turn, (torque[0] - c * omega[0], torque[1] - c * omega[1], torque[2] - c * omega[2]))
     return _times(_transposed(turn), _times(_matrix(eye.inertia[1]), resisted))
+
+
+@_inlined
+def _sticking(eye: Eye, turn: Matrix, omega: Vector, torque: Vector) -> Vector:
+    """The rigid body as the programs of the cable eye have it: one that is slow and hardly pulled is not pulled."""
+    c = eye.friction
+    net = torque[0] - c * omega[0], torque[1] - c * omega[1], torque[2] - c * omega[2]
+    if _dot(omega, omega) < CABLE_SPEED**2 and _dot(net, net) < CABLE_FRICTION**2:
+        torque = c * omega[0], c * omega[1], c * omega[2]
+    return _acceleration(eye, turn, omega, torque)
 
 
 @_inlined
@@ -270,7 +283,7 @@ def _run(
     diverged: NDArray[np.bool_],
     step_s: float,
     substeps: int,
-    published: bool,
+    published: int,
 ) -> None:
     """Move eyes; the saccades are independent of each other.
 
@@ -284,7 +297,7 @@ def _run(
         step_s: between samples [s].
         substeps: 0 for Algorithm 2 of the thesis, omega first, then q with the new omega. Otherwise so many steps of
             the classical Runge-Kutta method a sample, the motors on straight lines between samples.
-        published: with `substeps` 0, the author's program to the letter.
+        published: with `substeps` 0, the authors' programs to the letter: 1 that of arms, 2 that of spindles.
     """
     samples, motors, tendons = motor.shape[1], motor.shape[2], len(eye.pulled)
     at, end, behind = np.empty(motors), np.empty((tendons, 3)), np.empty(tendons)
@@ -322,12 +335,15 @@ def _run(
                         change = _acceleration(eye, turn, then, torque)
                         q, omega = _along(q, rate, _WEIGHTS[i] * h), _on(omega, change, _WEIGHTS[i] * h)
                     q = _scaled(q, 1 / math.sqrt(_square(q)))
-            elif published:
+            elif published == 1:
                 omega = _on(omega, _published(eye, turn, omega, torque), step_s)
                 q = _along(q, _product(omega, q, 0.0), 0.5 * step_s)
                 q = _scaled(q, 1 / math.sqrt(_square(q)))
             else:
-                omega = _on(omega, _acceleration(eye, turn, omega, torque), step_s)
+                if published == 2:
+                    omega = _on(omega, _sticking(eye, turn, omega, torque), step_s)
+                else:
+                    omega = _on(omega, _acceleration(eye, turn, omega, torque), step_s)
                 half = 0.5 * step_s
                 q = _turned(q, (half * omega[0], half * omega[1], half * omega[2]))
 
@@ -452,7 +468,7 @@ _EYE = _typeof(
         np.zeros((1, 3)),
         np.zeros((1, 3)),
         np.zeros((1, 3, 3)),
-        np.zeros((1, 2)),
+        np.zeros((1, 3)),
         np.zeros(2, np.int64),
         np.zeros(1, np.int64),
         np.zeros(1, bool),
@@ -462,7 +478,7 @@ _EYE = _typeof(
     )
 )
 _BATCH, _ROWS = _NUMBER[:, :, ::1], _NUMBER[:, ::1]
-run = _compiled(_run, (_EYE, *[_BATCH] * 4, numba.boolean[::1], _NUMBER, numba.int64, numba.boolean))
+run = _compiled(_run, (_EYE, *[_BATCH] * 4, numba.boolean[::1], _NUMBER, numba.int64, numba.int64))
 still = _compiled(_still, (_EYE, _BATCH, _ROWS, _ROWS, _ROWS))
 
 

@@ -17,29 +17,62 @@ _STEP = 1e-6  # rad, of the difference quotients
 _TOLERANCE = 1e-12  # N m; a degree is worth about 5e-3
 _ITERATIONS = 40
 _FAR_DEG = 60.0
+_TURN = 1e-4  # rad, of the difference quotients of the stiffness
+_STRIDES = (0.7, 0.1)  # rad, at most in an iteration: the second where the first does not come to rest
 
 
-def rest_orientation(torque: Torque, motor: Array) -> Array:
-    """Orientations (n, 4) without torque at motor positions [deg] (n, motors); NaN where a position is none.
+def stiffness(torque: Torque, orientation: Array, motor: Array) -> Array:
+    """By how much the torque turns an eye back [N m/rad], head frame, (n, 3, 3).
+
+    Args:
+        torque: on the eye.
+        orientation: (n, 4).
+        motor: [deg], (n, motors).
+    """
+    turns = np.concatenate([np.eye(3), -np.eye(3)]) * _TURN
+    here = rotation(np.repeat(orientation, 6, axis=0))
+    turned = (Rotation.from_rotvec(np.tile(turns, (len(motor), 1))) * here).as_quat(scalar_first=True)
+    found = torque(turned, np.repeat(motor, 6, axis=0)).reshape(-1, 2, 3, 3)
+    return np.asarray(-np.swapaxes(found[:, 0] - found[:, 1], 1, 2) / (2 * _TURN))
+
+
+def least_stiffness(torque: Torque, orientation: Array, motor: Array) -> Array:
+    """Of an eye at rest [N m/rad], (n,), about the axis where it is softest: not above 0 it is not stable.
+
+    Arguments as `stiffness`'.
+    """
+    K = stiffness(torque, orientation, motor)
+    return np.asarray(np.linalg.eigvalsh((K + np.swapaxes(K, 1, 2)) / 2)[:, 0])
+
+
+def rest_orientation(torque: Torque, motor: Array, ahead: Array) -> Array:
+    """Orientations (n, 4) in which an eye comes to rest; NaN where a position is none.
+
+    Args:
+        torque: on the eye.
+        motor: positions [deg], (n, motors).
+        ahead: positions [deg] (motors,) at which it rests straight ahead; the eye is followed on the way from there.
 
     Raises:
         InputError: no equilibrium was found from straight ahead.
     """
     motor = np.asarray(motor, dtype=float)
     known = np.asarray(np.isfinite(motor).all(axis=1))
-    motor = np.where(known[:, None], motor, 0.0)
-    # Along a path from zero, so that Newton's method stays on the branch the eye would follow.
-    far = np.abs(motor).max(axis=1, keepdims=True, initial=1e-9)
+    motor = np.where(known[:, None], motor, ahead)
+    # Along a path from straight ahead, so that Newton's method stays on the branch the eye would follow.
+    far = np.abs(motor - ahead).max(axis=1, keepdims=True, initial=1e-9)
     parts = max(1, int(np.ceil(far.max(initial=0.0) / 40.0)))
     orientation = np.tile(FORWARD, (len(motor), 1))
     for part in range(1, parts + 1):
-        orientation = _newton_orientation(torque, motor * np.minimum(1, 40.0 * part / far), orientation)
+        orientation = _newton_orientation(
+            torque, ahead + (motor - ahead) * np.minimum(1, 40.0 * part / far), orientation
+        )
     orientation[~known] = np.nan
     return orientation
 
 
 def _newton_orientation(torque: Torque, motor: Array, orientation: Array) -> Array:
-    for _ in range(_ITERATIONS):
+    for stride in np.repeat(_STRIDES, _ITERATIONS):
         residual = torque(orientation, motor)
         moving = np.abs(residual).max(axis=-1, initial=0.0) >= _TOLERANCE  # each row stops by itself
         if not moving.any():
@@ -48,9 +81,13 @@ def _newton_orientation(torque: Torque, motor: Array, orientation: Array) -> Arr
         for axis in np.eye(3):
             turned = Rotation.from_rotvec(_STEP * axis) * rotation(orientation)
             columns.append((torque(turned.as_quat(scalar_first=True), motor) - residual) / _STEP)
-        change = -np.linalg.solve(np.stack(columns, axis=-1), residual[..., None])[..., 0]
-        size = np.linalg.norm(change, axis=-1, keepdims=True)
-        change *= np.minimum(1, 0.7 / np.maximum(size, 1e-300))
+        # Elastics pull towards less energy: along it also where the eye would not stay.
+        slope = np.stack(columns, axis=-1)
+        size, ways = np.linalg.eigh((slope + np.swapaxes(slope, -1, -2)) / 2)
+        along = (np.swapaxes(ways, -1, -2) @ residual[..., None])[..., 0]
+        change = (ways @ (along / np.maximum(np.abs(size), 1e-12))[..., None])[..., 0]
+        length = np.linalg.norm(change, axis=-1, keepdims=True)
+        change *= np.minimum(1, stride / np.maximum(length, 1e-300))
         change[~moving] = 0
         orientation = np.where(
             moving[:, None],
@@ -63,15 +100,15 @@ def _newton_orientation(torque: Torque, motor: Array, orientation: Array) -> Arr
     raise InputError(f"no equilibrium found for motors at {np.round(motor[worst], 2).tolist()} deg; turn them less far")
 
 
-def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int], limit: Array) -> Array:
-    """Motor positions [deg] (n, motors) that hold orientations (n, 4), the others at 0.
+def rest_motor(torque: Torque, orientation: Array, ahead: Array, driven: list[int], limit: Array) -> Array:
+    """Motor positions [deg] (n, motors) that hold orientations (n, 4), the others where they are straight ahead.
 
     Gauss-Newton over the driven motors, inside limit (motors, 2) [deg].
 
     Raises:
         InputError: an orientation that these motors cannot hold.
     """
-    motor, held = held_motor(torque, orientation, motors, driven, limit)
+    motor, held = held_motor(torque, orientation, ahead, driven, limit)
     if not held.all():
         worst = int(held.argmin())
         raise InputError(
@@ -82,7 +119,7 @@ def rest_motor(torque: Torque, orientation: Array, motors: int, driven: list[int
 
 
 def held_motor(
-    torque: Torque, orientation: Array, motors: int, driven: list[int], limit: Array
+    torque: Torque, orientation: Array, ahead: Array, driven: list[int], limit: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """As `rest_motor`, and which of the orientations are held, (n,).
 
@@ -92,7 +129,7 @@ def held_motor(
     orientation = np.asarray(orientation, dtype=float)
     if not np.isfinite(orientation).all():
         raise InputError("an orientation to hold holds numbers that are not finite")
-    motor = np.zeros((len(orientation), motors))
+    motor = np.tile(ahead, (len(orientation), 1))
     step = np.rad2deg(_STEP)
     moving = np.ones(len(orientation), bool)  # each row stops by itself
     for _ in range(_ITERATIONS):
@@ -116,5 +153,5 @@ def held_motor(
     # Far from straight ahead the torque also vanishes where the eye would never come to rest.
     far = np.flatnonzero(~bad & (angle_between(orientation, FORWARD) > _FAR_DEG))
     if far.size:
-        bad[far] = angle_between(rest_orientation(torque, motor[far]), orientation[far]) > 1e-4
+        bad[far] = angle_between(rest_orientation(torque, motor[far], ahead), orientation[far]) > 1e-4
     return motor, ~bad

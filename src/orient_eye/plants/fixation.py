@@ -6,9 +6,11 @@
 
 Three motors turn an eye about three axes, so a direction of gaze leaves the torsion open. The force of a fixation is
 the sum over the motors' pairs of elastics of the squared difference of their tensions [N^2]; one torsion has the least.
+Of a plant with more motors than axes it is the squared change of the motors from their pretension [rad^2].
 """
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -18,16 +20,17 @@ from numpy.typing import NDArray
 
 from orient_eye import listing
 from orient_eye.errors import InputError
-from orient_eye.motor import names
+from orient_eye.motor import names, redundant
 from orient_eye.plants import Plant
 
 Array = NDArray[np.float64]
 Rule = Literal["least force", "listing", "fick"]
 """How the torsion of a fixation is chosen."""
-_DEGREE = 10  # of the fits: to 1e-5 deg
-_RINGS, _SPOKES = 10, 32
+_DEGREE, _SPOKES = 10, 32  # of the fits with as many rings: to 1e-4 deg
+_DEGREE_OF_MORE, _SPOKES_OF_MORE = 16, 48  # of more motors than axes: to 4e-4 deg
 _REACHES = np.arange(50.0, 0.0, -5.0)  # deg, tried from the largest
 _TORSIONS = np.arange(-12.0, 12.1, 3.0)  # deg, from which the least force is looked for
+_TORSIONS_OF_MORE = np.arange(-24.0, 24.1, 3.0)  # their plane is tilted
 _ROUNDS = 6
 
 
@@ -39,10 +42,12 @@ class Fixations:
         limit_deg: angle from straight ahead up to which the eye holds every direction; of one beyond it, the nearest
             inside is told.
         coefficients: of the fits, (terms, 1 + motors + 1).
+        degree: of the fits.
     """
 
     limit_deg: float
     coefficients: Array
+    degree: int = _DEGREE
 
     @classmethod
     def of(cls, plant: Plant, rule: Rule | None = None) -> "Fixations":
@@ -65,12 +70,15 @@ class Fixations:
 
     @classmethod
     def _solved(cls, plant: Plant, rule: Rule | None) -> "Fixations":
+        more = redundant(plant.motors)
+        degree, spokes = (_DEGREE_OF_MORE, _SPOKES_OF_MORE) if more else (_DEGREE, _SPOKES)
         for limit in _REACHES:
-            edge = np.isfinite(fixate(plant, _cone(limit)[-_SPOKES:], rule)[1]).all()
-            direction = _cone(limit)
+            direction = _cone(limit, degree, spokes)
+            edge = np.isfinite(fixate(plant, direction[-spokes:], rule)[1]).all()
             values = np.column_stack(fixate(plant, direction, rule)) if edge else np.full((1, 1), np.nan)
             if np.isfinite(values).all():
-                return cls(float(limit), np.linalg.lstsq(_terms(direction, limit), values, rcond=None)[0])
+                fitted = np.linalg.lstsq(_terms(direction, limit, degree), values, rcond=None)[0]
+                return cls(float(limit), fitted, degree)
         raise InputError(
             f"the motors of plant {plant.name!r} ({', '.join(names(plant.motors))}) do not hold the eye in every "
             "direction around straight ahead; choose targets about one axis"
@@ -79,7 +87,7 @@ class Fixations:
     def _told(self, direction: Array) -> Array:
         if not len(direction):
             return np.empty((0, self.coefficients.shape[1]))
-        return np.asarray(_terms(direction, self.limit_deg) @ self.coefficients)
+        return np.asarray(_terms(direction, self.limit_deg, self.degree) @ self.coefficients)
 
     def torsion(self, direction: Array) -> Array:
         """[deg] (n,) at directions (n, 3)."""
@@ -94,7 +102,7 @@ class Fixations:
         return self._told(direction)[:, 1:-1]
 
     def force(self, direction: Array) -> Array:
-        """[N^2] (n,) at directions (n, 3); 0 on a plant without elastics."""
+        """[N^2 or rad^2] (n,) at directions (n, 3); 0 on a plant without elastics."""
         return self._told(direction)[:, -1]
 
 
@@ -107,7 +115,7 @@ def knows_elastics(plant: Plant) -> bool:
 
 
 def fixate(plant: Plant, direction: Array, rule: Rule | None = None) -> tuple[Array, Array, Array]:
-    """Torsion [deg] (n,), motors (n, motors) and force [N^2] (n,) of fixations; NaN where the motors cannot hold one.
+    """Torsion [deg] (n,), motors (n, motors) and force (n,) of fixations; NaN where the motors cannot hold one.
 
     Args:
         plant: with motors that turn the eye about all axes.
@@ -119,27 +127,45 @@ def fixate(plant: Plant, direction: Array, rule: Rule | None = None) -> tuple[Ar
         return _at(plant, direction, listing.ficks_torsion(direction))
     if rule == "listing" or not knows_elastics(plant):
         return _at(plant, direction, np.zeros(count))
-    torsion, step = np.zeros(count), 0.0
-    offsets = _TORSIONS
+    return _at(plant, direction, best_torsion(lambda tried: _held(plant, tried)[1], direction, _tried(plant)))
+
+
+def best_torsion(cost: Callable[[Array], Array], direction: Array, tried_deg: Array = _TORSIONS_OF_MORE) -> Array:
+    """Torsion [deg] (n,) at which it costs least to look along directions (n, 3).
+
+    Args:
+        cost: of orientations (n, 4), (n,); NaN or infinite where there is none.
+        direction: of gaze.
+        tried_deg: torsions from which the least is looked for, equally spaced.
+    """
+    torsion, step = np.zeros(len(direction)), 0.0
+    offsets = tried_deg
     for _ in range(_ROUNDS):
         tried = torsion[:, None] + offsets
         flat = np.repeat(direction, len(offsets), axis=0)
-        force = _at(plant, flat, tried.ravel())[2].reshape(tried.shape)
-        torsion = _lowest(tried, force)
+        torsion = _lowest(tried, cost(listing.with_torsion(flat, tried.ravel())).reshape(tried.shape))
         step = (step or float(offsets[1] - offsets[0])) / 3
         offsets = step * np.array([-1.0, 0.0, 1.0])
-    return _at(plant, direction, torsion)
+    return torsion
+
+
+def _tried(plant: Plant) -> Array:
+    return _TORSIONS_OF_MORE if redundant(plant.motors) else _TORSIONS
 
 
 def _at(plant: Plant, direction: Array, torsion: Array) -> tuple[Array, Array, Array]:
     """Torsion, motors and force at a given torsion (n,)."""
-    orientation = listing.with_torsion(direction, torsion)
+    return torsion, *_held(plant, listing.with_torsion(direction, torsion))
+
+
+def _held(plant: Plant, orientation: Array) -> tuple[Array, Array]:
+    """Motors and force of orientations (n, 4)."""
     motor = plant.held(orientation, names(plant.motors))
     held = np.isfinite(motor).all(axis=1)
     found = plant.force(orientation[held], motor[held])
     force = np.full(len(motor), np.nan)
     force[held] = 0.0 if found is None else found
-    return torsion, motor, force
+    return motor, force
 
 
 def _lowest(x: Array, value: Array) -> Array:
@@ -155,19 +181,19 @@ def _lowest(x: Array, value: Array) -> Array:
     return np.asarray(x[rows, least] + shift * (x[:, 1] - x[:, 0]))
 
 
-def _cone(limit_deg: float) -> Array:
+def _cone(limit_deg: float, rings: int, spokes: int) -> Array:
     """Directions all over a cone, denser towards its edge, (n, 3)."""
-    away = np.deg2rad(limit_deg) * np.sin(np.pi / 2 * np.arange(1, _RINGS + 1) / _RINGS)
-    around = 2 * np.pi * np.arange(_SPOKES) / _SPOKES
+    away = np.deg2rad(limit_deg) * np.sin(np.pi / 2 * np.arange(1, rings + 1) / rings)
+    around = 2 * np.pi * np.arange(spokes) / spokes
     away, around = (g.ravel() for g in np.meshgrid(away, around, indexing="ij"))
     points = np.stack([np.cos(away), np.sin(away) * np.cos(around), np.sin(away) * np.sin(around)], axis=1)
     return np.concatenate([[[1.0, 0.0, 0.0]], points])
 
 
-def _terms(direction: Array, limit_deg: float) -> Array:
-    """Chebyshev's polynomials of total degree up to `_DEGREE` (n, terms), of directions moved inside the cone."""
+def _terms(direction: Array, limit_deg: float, degree: int) -> Array:
+    """Chebyshev's polynomials of total degree up to one (n, terms), of directions moved inside the cone."""
     half = np.tan(np.deg2rad(limit_deg) / 2)
     r = listing.rotation_vectors(listing.with_torsion(direction, 0.0))[:, 1:] / half
     r = r / np.maximum(np.linalg.norm(r, axis=1, keepdims=True), 1.0)
-    low = np.add.outer(np.arange(_DEGREE + 1), np.arange(_DEGREE + 1)) <= _DEGREE
-    return np.asarray(chebvander2d(r[:, 0], r[:, 1], [_DEGREE, _DEGREE])[:, low.ravel()])
+    low = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree
+    return np.asarray(chebvander2d(r[:, 0], r[:, 1], [degree, degree])[:, low.ravel()])

@@ -19,7 +19,7 @@ from orient_eye import rotations
 from orient_eye.commands.motor_file import Wiring
 from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
-from orient_eye.motor import Motor, names
+from orient_eye.motor import Motor, names, rests
 from orient_eye.plants import Plant
 from orient_eye.rig import Rig
 from orient_eye.surrogate import Surrogate
@@ -43,7 +43,7 @@ def limits_of(rig: Rig | Limits | str | Path, motors: Sequence[Motor], plant: st
         plant: its name, for messages.
 
     Raises:
-        InputError: a motor that the plant has not, or no range in common.
+        InputError: a motor that the plant has not, no range in common, or one in which a motor does not rest.
     """
     given = rig if isinstance(rig, Mapping) else _limits_by_motor(as_rig(rig))
     strange = [name for name in given if name not in names(motors)]
@@ -60,6 +60,11 @@ def limits_of(rig: Rig | Limits | str | Path, motors: Sequence[Motor], plant: st
         if "range" in told:
             low, high = (float(end) for end in told["range"])
             told["range"] = [max(low, motor.range[0]), min(high, motor.range[1])]
+            if motor.rest and not told["range"][0] <= motor.rest <= told["range"][1]:
+                raise InputError(
+                    f"the rig lets motor {motor.name!r} go from {low:g} to {high:g} {motor.unit}, but it stands "
+                    f"at {motor.rest:.4g} when the eye looks straight ahead: choose a range around that"
+                )
         if told:
             found[motor.name] = told
     limited(motors, found)
@@ -143,7 +148,7 @@ def wiring(plant: Plant, rig: Rig | str | Path) -> Wiring:
     """
     described = as_rig(rig)
     if len(plant.motors) == 1:
-        one, zero = (rotations.rotation(plant.rest(np.full((1, 1), at))) for at in (1.0, 0.0))
+        one, zero = (rotations.rotation(plant.rest(rests(plant.motors)[None] + by)) for by in (1.0, 0.0))
         turned = one * zero.inv()
         angles = np.abs(rotations.to_euler(turned.as_quat(scalar_first=True)))[:, 0]
         axis = AXES[int(angles.argmax())]

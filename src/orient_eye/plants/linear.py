@@ -5,7 +5,7 @@ for rigs. A pulse-step from rest gives a movement in closed form, with no sampli
 one that a limit of the motor changes, is a path of straight lines between samples, and the eye is exact on those.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,9 +69,7 @@ class LinearPlant(SimulatedPlant):
         numbers = surrogate if isinstance(surrogate, Surrogate) else Surrogate.load(surrogate)
         numbers = limited_surrogate(numbers, rig)
         self.surrogate, self.step_s = numbers, checked_step(step_s)
-        bounds = numbers.range or (-_WORKING_DEG, _WORKING_DEG)
-        motor = numbers.as_motor((max(bounds[0], -_WORKING_DEG), min(bounds[1], _WORKING_DEG)))
-        self.motors = (motor,)
+        self.motors = (numbers.as_motor((numbers.rest - _WORKING_DEG, numbers.rest + _WORKING_DEG)),)
         self.poles: tuple[Any, ...]
         if numbers.w0 is not None:
             self.poles = (numbers.w0,)
@@ -104,6 +102,7 @@ class LinearPlant(SimulatedPlant):
             "range": None if s.range is None else list(s.range),
             "speed_limit": s.speed_limit,
             "acceleration_limit": s.acceleration_limit,
+            "rest": s.rest or None,
         }
         told = {**numbers, **of_motor}
         return {"plant": self.name, **{key: value for key, value in told.items() if value is not None}}
@@ -143,8 +142,8 @@ class LinearPlant(SimulatedPlant):
 
     def _sampled(self, given: Given) -> "PathMovement":
         """Behind the dead time the eye answers to where its motor stood before time 0, which is that of the start."""
-        motor, before = given.motor[..., 0], given.start.motor[:, 0]
         s = self.surrogate
+        motor, before = given.motor[..., 0] - s.rest, given.start.motor[:, 0] - s.rest
         angle, rate = sampled_response(s.K, self.poles, s.dead_time, motor, self.step_s, before)
         off = self._angle(given.start.orientation) - s.K * before
         off = np.where(np.abs(off) < _SAME_DEG, 0.0, off)
@@ -168,11 +167,20 @@ class LinearPlant(SimulatedPlant):
 
     def rest(self, motor: Array) -> Array:
         """See `orient_eye.plants.Plant`."""
-        return rotations.about(self.surrogate.axis, self.surrogate.K * np.asarray(motor, float)[:, 0])
+        return rotations.about(self.surrogate.axis, self.angle_at(np.asarray(motor, float)[:, 0]))
 
     def hold(self, orientation: Array, driven: tuple[str, ...] = ()) -> Array:
         """See `orient_eye.plants.Plant`."""
-        return self._angle(np.asarray(orientation, float))[:, None] / self.surrogate.K
+        return self.surrogate.rest + self._angle(np.asarray(orientation, float))[:, None] / self.surrogate.K
+
+    def angle_at(self, motor: Array) -> Array:
+        """About the axis [deg] (...), of eyes that rest with the motor at (...) [deg]."""
+        return self.surrogate.K * (motor - self.surrogate.rest)
+
+    def from_rest(self, command: PulseStep) -> PulseStep:
+        """The same pulse-steps of a motor whose positions count from its rest."""
+        rest = self.surrogate.rest
+        return replace(command, F=command.F - rest, D=command.D - rest) if rest else command
 
     def _rests(self, start: State | None, motor: Array) -> NDArray[np.bool_]:
         """Which eyes rest where these motor positions hold them, (saccades,); a start of another shape does not."""
@@ -226,7 +234,8 @@ class ClosedMovement:
     @cached_property
     def response(self) -> LinearResponse:
         """In closed form."""
-        return LinearResponse(self.plant.surrogate.K, self.plant.poles, self.plant.surrogate.dead_time, self.command)
+        s = self.plant.surrogate
+        return LinearResponse(s.K, self.plant.poles, s.dead_time, self.plant.from_rest(self.command))
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
@@ -289,7 +298,7 @@ class PathMovement(GivenMovement):
         if of == "gaze" and self.plant.surrogate.axis == "roll":
             rest = self.plant.rest(np.clip(self.given.command.final, low, high))
             return measure(self.trajectory(), rest, band=band, of=of)
-        final = self.plant.surrogate.K * np.clip(self.given.command.final[:, 0], low, high)
+        final = self.plant.angle_at(np.clip(self.given.command.final[:, 0], low, high))
         failed = self.given.failed | ~np.isfinite(final)
         time = self.plant.times(self.angle.shape[1])
         return measure_angle(time, self.angle, self.rate, final, self.plant.surrogate.axis, failed, band=band)

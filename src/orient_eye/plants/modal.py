@@ -18,7 +18,7 @@ from orient_eye.commands import checked_step
 from orient_eye.constants import HORIZON_S, STEP_S
 from orient_eye.errors import InputError
 from orient_eye.modal_surrogate import ModalSurrogate, Mode, angular_velocity, as_orientation, as_vector, vector_rate
-from orient_eye.motor import check_driven
+from orient_eye.motor import check_driven, rests
 from orient_eye.plants.linear_response import free_response, sampled_response, second_order_poles
 from orient_eye.plants.simulated import Run, SimulatedPlant
 from orient_eye.state import State
@@ -89,7 +89,7 @@ class ModalPlant(SimulatedPlant):
         return as_orientation(self._wanted(np.asarray(motor, float)))
 
     def hold(self, orientation: Array, driven: tuple[str, ...]) -> Array:
-        """See `orient_eye.plants.Plant`; of motors that can do it in many ways, those that move least."""
+        """See `orient_eye.plants.Plant`; of motors that can do it in many ways, the least change from their rest."""
         motor, off = self._inverse(orientation, driven)
         held = off < _HELD_DEG
         if not held.all():
@@ -114,15 +114,15 @@ class ModalPlant(SimulatedPlant):
 
     def _wanted(self, motor: Array) -> Array:
         """Rotation vectors [deg] (..., 3) to which motors at (..., motors) draw the eye; the same in any batch."""
-        return np.asarray(np.einsum("ij,...j->...i", self.surrogate.K, motor))
+        return np.asarray(np.einsum("ij,...j->...i", self.surrogate.K, motor - rests(self.motors)))
 
     def _inverse(self, orientation: Array, driven: tuple[str, ...]) -> tuple[Array, Array]:
-        """Positions (saccades, motors) that come nearest, the others at 0, and how far off they are [deg]."""
+        """Positions (saccades, motors) that come nearest, the others at rest, and how far off they are [deg]."""
         index = check_driven(self.motors, driven, self.name)
         with np.errstate(divide="ignore", invalid="ignore"):  # half a turn is not held
             vector = as_vector(orientation)
-            motor = np.zeros((len(vector), len(self.motors)))
-            motor[:, index] = vector @ np.linalg.pinv(self.surrogate.K[:, index]).T
+            motor = np.tile(rests(self.motors), (len(vector), 1))
+            motor[:, index] += vector @ np.linalg.pinv(self.surrogate.K[:, index]).T
             return motor, np.asarray(np.linalg.norm(self._wanted(motor) - vector, axis=1))
 
 

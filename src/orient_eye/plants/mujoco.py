@@ -25,7 +25,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.eyes.model import tendon_tension
+from orient_eye.eyes.model import Tendons
 from orient_eye.motor import names
 from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.limits import Limits
@@ -49,6 +49,7 @@ class MujocoPlant(ElasticPlant):
         eye: preset, one of `orient_eye.eyes.EYES`, or an MJCF file of the same form.
         accurate: integrate at 0.2 ms, friction implicit, instead of the thesis' explicit 1 ms.
         gravity: add the gravity torque (thesis 3.8), off in the thesis' runs.
+        pretension: the motors rest as the eye's keyframe `pretension_N` says; None for its first, or 0 without one.
         rig: whose motors limit those of the same names: a TOML file, a shipped rig, or the limits by motor.
         threads: of the batch; 0 for one a core.
 
@@ -64,21 +65,27 @@ class MujocoPlant(ElasticPlant):
         *,
         accurate: bool = False,
         gravity: bool = False,
+        pretension: float | None = None,
         rig: Rig | Limits | str | Path | None = None,
         threads: int = 0,
     ) -> None:
         self.substeps = _ACCURATE_SUBSTEPS if accurate else 1
         options = {"eye": eye, "accurate": accurate, "gravity": gravity}
-        super().__init__(options, step_s=self.step_s / self.substeps, threads=threads, gravity=gravity, rig=rig)
+        step_s = self.step_s / self.substeps
+        super().__init__(options, step_s=step_s, threads=threads, gravity=gravity, pretension=pretension, rig=rig)
         if accurate:
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         eye_joint = self.model.joint("eye")
         self._eye_qpos = eye_joint.qposadr[0] + np.arange(4)
         self._eye_qvel = eye_joint.dofadr[0] + np.arange(3)
-        self._motor_ctrl = np.array([self.model.actuator(name).id for name in names(self.motors)])
-        joints = [self.model.joint(self.model.actuator(name).trnid[0]) for name in names(self.motors)]
-        self._motor_qpos = np.array([joint.qposadr[0] for joint in joints])
-        self._per_control = np.deg2rad(1) / self.model.actuator_gear[self._motor_ctrl, 0]  # joint position a deg
+        actuators = [self.model.actuator(name) for name in names(self.motors)]
+        self._motor_ctrl = np.array([each.id for each in actuators])
+        # A spindle acts as its control says in the same step, an arm stands there one step later.
+        self._arms = np.array([each.trntype[0] == mujoco.mjtTrn.mjTRN_JOINT for each in actuators])
+        joints = [self.model.joint(each.trnid[0]) for each in np.array(actuators, dtype=object)[self._arms]]
+        self._arm_qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
+        self._arm_per_degree = np.deg2rad(1) / self.model.actuator_gear[self._motor_ctrl[self._arms], 0]
+        self._tendons = Tendons.of(self.model)
         # What is recorded is what the file's sensors measure: MuJoCo's threads then do all the work.
         self._sensed_orientation = self._sensed("orientation")
         self._sensed_velocity = self._sensed("angular_velocity")
@@ -118,14 +125,13 @@ class MujocoPlant(ElasticPlant):
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         batch.warning[:] = 0
         batch.qpos[:, self._eye_qpos] = start.orientation
-        batch.qpos[:, self._motor_qpos] = motor[:, 0] * self._per_control
+        batch.qpos[:, self._arm_qpos] = motor[:, 0, self._arms] * self._arm_per_degree
         batch.qvel[:, self._eye_qvel] = rotation(start.orientation).inv().apply(np.deg2rad(start.angular_velocity))
 
         steps = (samples - 1) * self.substeps
         before_steps = np.empty((size, 0, self.model.nsensordata))
         if steps:
-            # An arm stands where ctrl says one step later, so each step is sent the next instant. Sensors
-            # describe the state before a step; the last state is measured afterwards.
+            # Sensors describe the state before a step; the last state is measured afterwards.
             record = batch.rollout(steps, self._control(np.deg2rad(motor)), record=("sensordata",))
             before_steps = record["sensordata"][:, :: self.substeps]
         last = batch.bind("sensordata")
@@ -134,27 +140,28 @@ class MujocoPlant(ElasticPlant):
         for output, sensed, convert in (
             (orientation, self._sensed_orientation, lambda x: x),
             (velocity, self._sensed_velocity, np.rad2deg),
-            (tension, self._sensed_length, self._tension),
+            (tension, self._sensed_length, lambda x: x),
         ):
             output[:, :-1] = convert(before_steps[..., sensed])
             output[:, -1] = convert(last[:, sensed])
+        tension[:] = self._tendons.tension(tension, np.deg2rad(motor))
         return np.asarray(diverged | ~np.isfinite(orientation).all(axis=(1, 2)))
 
-    def _tension(self, length: Array) -> Array:
-        return tendon_tension(self.model, length)
-
     def _control(self, command: Array) -> Array:
-        """Controls [rad] (saccades, steps, nu) that put the arms on the command."""
+        """Controls [rad] (saccades, steps, nu) that put arms and spindles on the command."""
         saccades, samples = command.shape[:2]
         steps = (samples - 1) * self.substeps
         control = np.zeros((saccades, steps, self.model.nu))
-        if self.substeps == 1:
-            control[..., self._motor_ctrl] = command[:, 1:]
-        else:  # the middle of the step after this one
-            at = np.minimum((np.arange(steps) + 1.5) / self.substeps, samples - 1)
-            row = np.minimum(at.astype(int), samples - 2)
-            share = (at - row)[:, None]
-            control[..., self._motor_ctrl] = (1 - share) * command[:, row] + share * command[:, row + 1]
+        for ahead in np.unique(self._arms):
+            some = self._arms == ahead
+            which, told = self._motor_ctrl[some], command[..., some]
+            if self.substeps == 1:
+                control[..., which] = told[:, 1:] if ahead else told[:, :-1]
+            else:  # the middle of this step, or of the one after it
+                at = np.minimum((np.arange(steps) + 0.5 + ahead) / self.substeps, samples - 1)
+                row = np.minimum(at.astype(int), samples - 2)
+                share = (at - row)[:, None]
+                control[..., which] = (1 - share) * told[:, row] + share * told[:, row + 1]
         return control
 
     def twin(self) -> TavaresPlant | None:
@@ -184,15 +191,16 @@ class MujocoPlant(ElasticPlant):
     def tension(self, orientation: Array, motor: Array) -> Array:
         """See `orient_eye.plants.elastic.ElasticPlant`."""
         (sensed,) = self._still(orientation, motor, "sensordata")
-        return self._tension(sensed[:, self._sensed_length])
+        return self._tendons.tension(sensed[:, self._sensed_length], np.deg2rad(motor))
 
     def _still(self, orientation: Array, motor: Array, *fields: str) -> list[Array]:
         """Fields (n, size) of MuJoCo's data with the eye and its motors at rest."""
         if not len(orientation):
             return [np.zeros((0, getattr(self._empty, field).size)) for field in fields]
-        with self._pool.batch("still", len(orientation)) as batch:  # nothing but qpos ever changes in these
+        with self._pool.batch("still", len(orientation)) as batch:  # nothing else ever changes in these
             batch.qpos[:, self._eye_qpos] = orientation
-            batch.qpos[:, self._motor_qpos] = motor * self._per_control
+            batch.qpos[:, self._arm_qpos] = motor[:, self._arms] * self._arm_per_degree
+            batch.ctrl[:, self._motor_ctrl[~self._arms]] = np.deg2rad(motor[:, ~self._arms])
             bound = [batch.bind(field) for field in fields]
             batch.forward()
             return [np.array(each) for each in bound]

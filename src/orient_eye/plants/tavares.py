@@ -39,7 +39,9 @@ class TavaresPlant(CompiledPlant):
         as_published: the author's program to the letter. The inertia is turned as printed, R^T I R (3.10,
             it should be R I R^T), there is no gyroscopic torque, a step adds a straight piece to the
             quaternion and normalises it, and the eye stands still while slower than 1e-5 rad/s under
-            less than 0.006 N m. Without it: a full rigid body, viscous friction only, exact rotations.
+            less than 0.006 N m. Without it: a full rigid body, viscous friction only, exact rotations. Of an eye that
+            spindles turn: its torque is 0 while it turns slower than 0.01 rad/s under less than 0.005 N m.
+        pretension: the motors rest as the eye's keyframe `pretension_N` says; None for its first, or 0 without one.
         rig: whose motors limit those of the same names: a TOML file, a shipped rig, or the limits by motor.
         threads: that share a batch; 0 for one a core.
 
@@ -57,6 +59,7 @@ class TavaresPlant(CompiledPlant):
         accurate: bool = False,
         gravity: bool = False,
         as_published: bool = False,
+        pretension: float | None = None,
         rig: Rig | Limits | str | Path | None = None,
         threads: int = 0,
     ) -> None:
@@ -65,7 +68,9 @@ class TavaresPlant(CompiledPlant):
         options = {"eye": eye, "gravity": gravity, "as_published": as_published}
         if accurate:  # told only then: what was kept of the thesis' integrator still has this identity
             options["accurate"] = True
-        super().__init__(options, rig=rig, threads=threads)
+        super().__init__(options, pretension=pretension, rig=rig, threads=threads)
+        spindles = bool(self.elastics.wound.any())
+        self._published = (2 if spindles else 1) if as_published else 0
         decay = self.step_s * self.elastics.friction / np.linalg.eigvalsh(self.elastics.inertia)[0]
         self.substeps = max(1, int(np.ceil(decay / _DECAY))) if accurate else 0
 
@@ -78,8 +83,8 @@ class TavaresPlant(CompiledPlant):
 
         def move(part: slice) -> None:
             self._kernel.run(
-                self._weighed, motor[part] * self._per_control, orientation[part], velocity[part], tension[part],
-                diverged[part], self.step_s, self.substeps, bool(self.options["as_published"]),
+                self._weighed, motor[part] * self.elastics.per_degree, orientation[part], velocity[part], tension[part],
+                diverged[part], self.step_s, self.substeps, self._published,
             )  # fmt: skip
             np.rad2deg(velocity[part], out=velocity[part])
 

@@ -169,19 +169,22 @@ class UncertainMovement(GivenMovement):
         numbers = self.numbers[which]
         command = self.given.command
         assert isinstance(command, PulseStep)
-        response = LinearResponse(numbers.K, numbers.poles, numbers.dead_time, command[which])
+        command = self.plant.from_rest(command[which])
+        response = LinearResponse(numbers.K, numbers.poles, numbers.dead_time, command)
         return measure_closed_form(response, band, self.plant.surrogate.axis)
 
     def _measure_sampled(self, which: NDArray[np.bool_], band: float) -> Measures:
         angle, rate = self._sample(which)
         low, high = self.plant.motors[0].range
-        final = self.numbers.K[which] * np.clip(self.given.command.final[which, 0], low, high)
+        stands = np.clip(self.given.command.final[which, 0], low, high)
+        final = self.numbers.K[which] * (stands - self.plant.surrogate.rest)
         failed = self.given.failed[which] | ~np.isfinite(final)
         time = self.plant.times(angle.shape[1])
         return measure_angle(time, angle, rate, final, self.plant.surrogate.axis, failed, band=band)
 
     def _sample(self, which: NDArray[np.bool_]) -> tuple[Array, Array]:
-        numbers, motor, before = self.numbers[which], self.given.motor[which, :, 0], self.given.start.motor[which, 0]
+        numbers, rest = self.numbers[which], self.plant.surrogate.rest
+        motor, before = self.given.motor[which, :, 0] - rest, self.given.start.motor[which, 0] - rest
         return sampled_response(numbers.K, numbers.poles, numbers.dead_time, motor, self.plant.step_s, before)
 
     def trajectory(self) -> Trajectory:

@@ -38,6 +38,7 @@ class ViscousPlant(CompiledPlant):
     Args:
         eye: preset, one of `orient_eye.eyes.EYES`, or an MJCF file of the same form.
         gravity: add the gravity torque (thesis 3.8).
+        pretension: as of `orient_eye.plants.tavares.TavaresPlant`.
         rig: whose motors limit those of the same names: a TOML file, a shipped rig, or the limits by motor.
         threads: that share a batch; 0 for one a core.
 
@@ -53,10 +54,11 @@ class ViscousPlant(CompiledPlant):
         eye: str = "thesis",
         *,
         gravity: bool = False,
+        pretension: float | None = None,
         rig: Rig | Limits | str | Path | None = None,
         threads: int = 0,
     ) -> None:
-        super().__init__({"eye": eye, "gravity": gravity}, rig=rig, threads=threads)
+        super().__init__({"eye": eye, "gravity": gravity}, pretension=pretension, rig=rig, threads=threads)
         self.tendons = ()
         sizes = np.sort(np.abs(self._modes[0]))  # three of the elastics, then three of the inertia
         if not sizes[3] > _APART * sizes[2]:
@@ -77,8 +79,8 @@ class ViscousPlant(CompiledPlant):
 
         def move(part: slice) -> None:
             self._creep(
-                self._weighed, motor[part] * self._per_control, orientation[part], velocity[part], diverged[part],
-                self.step_s, self.stride,
+                self._weighed, motor[part] * self.elastics.per_degree, orientation[part], velocity[part],
+                diverged[part], self.step_s, self.stride,
             )  # fmt: skip
             np.rad2deg(velocity[part], out=velocity[part])
 

@@ -16,8 +16,10 @@ Entities of a saccade, below /saccades/GROUP/INDEX_TITLE, in deg, deg/s, N and t
     motor/NAME                                  motor positions
     command/NAME                                where motors were told to be, where they were elsewhere
     tension                                     of all tendons of the model
+    tension/NAME                                instead, where they are muscles: antagonists with a motor each
     reference/...                               angle, velocity and motor of the reference
     scene/BODY, scene/tendons, scene/target     3-D, metres, head frame
+    scene/muscles                               their names, where the tendons are muscles
     scene/trace, scene/start, scene/moment      way of the gaze ahead of the eye; where pitch or torsion move
     scene/reference_trace                       of the reference
     listing/path, listing/end, listing/moment   rotation vectors, 2 atan(r) [deg]; where torsion is shown
@@ -40,6 +42,7 @@ from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording import titles as naming
 from orient_eye.recording.curves import Curves
 from orient_eye.recording.layout import SaccadeTab, blueprint, saccade_colours
+from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.rotation_vectors import RotationVectors
 from orient_eye.recording.scene import Scene, slug
@@ -69,7 +72,7 @@ def record(
 
     Args:
         path: the file, NAME.rrd.
-        trajectory: the saccades, of any plant. Motors of the model that it lacks stand at 0, and where it
+        trajectory: the saccades, of any plant. Motors of the model that it lacks stand at rest, and where it
             has no tension the tendons show that of their length.
         model: the compiled eye to draw, with its shapes: `plant.drawn()`; None for a ball without motors and tendons.
         target: orientations w, x, y, z, (saccades, 4); `rotations.from_yaw(yaw_deg)` for horizontal ones.
@@ -124,9 +127,11 @@ def _write(path: Path, content: _Content, model: mujoco.MjModel) -> Path:
     trajectory, target, reference = content.trajectory, content.target, content.reference
     shown = [tab for tab in content.tabs if not trajectory.failed[tab.index]]
     drawn = [tab.index for tab in shown]
-    poses = pose(model, trajectory)
-    curves = Curves(trajectory, drawn, poses.tension, tendon_names(model), target=target, reference=reference)
-    scene = Scene(model, poses, drawn, graticule=curves.graticule)
+    poses, muscles = pose(model, trajectory), Muscles.of(model)
+    curves = Curves(
+        trajectory, drawn, poses.tension, tendon_names(model), target=target, reference=reference, muscles=muscles
+    )
+    scene = Scene(model, poses, drawn, graticule=curves.graticule, muscles=muscles)
     vectors = RotationVectors(trajectory.orientation[drawn]) if "torsion" in curves.turns else None
     plots, compared = curves.plots(), curves.compared()
     lasts_s = float(trajectory.time[-1])

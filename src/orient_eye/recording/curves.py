@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from orient_eye import listing, rotations
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording.directions import Graticule, net, protractor
+from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.scene import REFERENCE_COLOUR, TIMELINE, Colour, slug
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class Plot:
         span: smallest and largest value over all saccades, so that tabs compare.
         legend: how many curves of one saccade it has to tell apart; 0 where there is one.
         shaded: the first curve has another hue than its saccade's colour, because of its place in a saccade's tab.
+        labels: of the curves in a saccade's own tab; none for their names with its title.
+        row: in which it stands with others; 0 for wherever there is room.
     """
 
     name: str
@@ -47,6 +50,8 @@ class Plot:
     span: tuple[float, float]
     legend: int = 0
     shaded: bool = False
+    labels: tuple[str, ...] = ()
+    row: int = 0
 
 
 class Curves:
@@ -59,6 +64,7 @@ class Curves:
         tendons: their names.
         target: orientations (saccades, 4), or (saccades, time, 4) where it changes, or None.
         reference: another trajectory of the same saccades, or None.
+        muscles: what the tendons are, where they are antagonists: each two share their plots. None for tendons.
 
     Attributes:
         own: entity path below a saccade's root to values (saccades, time).
@@ -79,8 +85,10 @@ class Curves:
         *,
         target: Array | None = None,
         reference: Trajectory | None = None,
+        muscles: Muscles | None = None,
     ) -> None:
-        self._drawn, self._time, self._tension, self._tendons = drawn, trajectory.time, tension, tendons
+        self._drawn, self._time, self._tension = drawn, trajectory.time, tension
+        self._tendons, self._muscles = () if muscles else tendons, muscles
         orientations = [trajectory.orientation[drawn]]
         orientations += [] if target is None else [target[drawn]]
         orientations += [] if reference is None else [np.nan_to_num(reference.orientation[drawn])]
@@ -94,6 +102,8 @@ class Curves:
         self.eccentricity_deg = max(float(each.max(initial=0)) for each in away)
         self.largest_deg = {turn: largest[turn] if turn in turns else 0.0 for turn in _TURNS}
         self.own = _curves(trajectory, turns)
+        if muscles:
+            self.own |= {f"tension/{slug(name)}": tension[..., i] for i, name in enumerate(muscles.names)}
         self._units = {f"motor/{slug(motor.name)}": motor.unit for motor in trajectory.motors}
         off = np.abs(np.nan_to_num(trajectory.command - trajectory.motor)[drawn]).max(axis=(0, 1), initial=0) > _SAME
         self.told = {
@@ -114,13 +124,20 @@ class Curves:
         return protractor(max(self.largest_deg["yaw"], 30))
 
     def plots(self) -> list[Plot]:
-        """Beside the eye: angles with targets (torsion apart), motors by unit with commands, velocity, tension."""
+        """Beside the eye: angles with targets (torsion apart), motors by unit with commands, velocity, tension.
+
+        Of muscles motors and tensions have a row each, with a plot for each two antagonists.
+        """
         moving = self._moving_motors()
         units = dict.fromkeys(self._units[name] for name in moving)
         angles = [f"angle/{turn}" for turn in self.turns]
         gaze, torsion = ([a for a in angles if (a == "angle/torsion") == apart] for apart in (False, True))
+        turned = [self._angle_plot(shown) for shown in (gaze, torsion) if shown]
+        if self._muscles:
+            own = [*turned, self._plot("angular velocity [deg/s]", self._named("velocity"))]
+            return [_labelled(plot, row) for row, plots in enumerate((own, *self._pairs()), 1) for plot in plots]
         plots = [
-            *(self._angle_plot(shown) for shown in (gaze, torsion) if shown),
+            *turned,
             *(self._motor_plot([name for name in moving if self._units[name] == unit]) for unit in units),
             self._plot("angular velocity [deg/s]", self._named("velocity")),
         ]
@@ -130,18 +147,26 @@ class Curves:
         return plots
 
     def compared(self) -> list[Plot]:
-        """Those that show all saccades: one curve a saccade in each, with its target."""
+        """Those that show all saccades: one curve a saccade in each, with its target; of muscles no tension."""
+        curves = [
+            (plot.row, place, curve)
+            for plot in self.plots()
+            for place, curve in enumerate(name for name in plot.series if name in self.own)
+        ]
+        if self._muscles:  # antagonists one above the other: the first of each two, then the others
+            curves.sort(key=lambda curve: (curve[0], curve[1] * (curve[0] > 1)))
         plots = []
-        for plot in self.plots():
-            for place, curve in enumerate(name for name in plot.series if name in self.own):
-                quantity, what = curve.split("/")
-                if quantity == "angle":
-                    each = self._angle_plot([curve])
-                elif quantity == "motor":
-                    each = self._motor_plot([curve])
-                else:
-                    each = self._plot(f"angular velocity about {what} [deg/s]", [curve])
-                plots.append(replace(each, shaded=place > 0))
+        for _, place, curve in curves:
+            quantity, what = curve.split("/")
+            if quantity == "angle":
+                each = self._angle_plot([curve])
+            elif quantity == "motor":
+                each = self._motor_plot([curve])
+            elif quantity == "velocity":
+                each = self._plot(f"angular velocity about {what} [deg/s]", [curve])
+            else:
+                continue
+            plots.append(replace(each, shaded=place > 0))
         return plots
 
     def draw(self, rec: "rr.RecordingStream", root: str, saccade: int, *, title: str, colour: Colour) -> None:
@@ -164,6 +189,15 @@ class Curves:
             colours = [TENDON_COLOURS[i % len(TENDON_COLOURS)] for i in range(len(self._tendons))]
             style = {"names": self._tendons, "colors": colours, "widths": [1.5] * len(colours)}
             _send(rec, f"{root}/tension", self._time, self._tension[saccade], style)
+
+    def _pairs(self) -> tuple[list[Plot], list[Plot]]:
+        """Of antagonists: their motors and their tensions, each kind on one scale."""
+        assert self._muscles is not None
+        both = [[slug(self._muscles.names[i]) for i in pair] for pair in self._muscles.pairs.tolist()]
+        known = [[f"motor/{name}" for name in names if f"motor/{name}" in self.own] for names in both]
+        motors = [self._motor_plot(pair) for pair in known if pair]
+        tensions = [self._plot(f"{', '.join(names)} [N]", [f"tension/{name}" for name in names]) for names in both]
+        return _on_one_scale(motors), _on_one_scale(tensions)
 
     def _named(self, quantity: str) -> list[str]:
         return [name for name in self.own if name.startswith(f"{quantity}/")]
@@ -196,6 +230,22 @@ class Curves:
         span = float(min(v.min(initial=0) for v in values)), float(max(v.max(initial=0) for v in values))
         several = sum(each in self.own for each in series) > 1
         return Plot(name, tuple(series), span, legend=len(series) if several else 0)
+
+
+def _labelled(plot: Plot, row: int) -> Plot:
+    """In a row, its curves called after what they show."""
+    return replace(plot, row=row, labels=tuple(name.replace("_", " ") for name in map(_last, plot.series)))
+
+
+def _last(path: str) -> str:
+    quantity, what = path.split("/")
+    return f"command {what}" if quantity == "command" else what
+
+
+def _on_one_scale(plots: Sequence[Plot]) -> list[Plot]:
+    spans = [plot.span for plot in plots]
+    low, high = min((low for low, _ in spans), default=0.0), max((high for _, high in spans), default=0.0)
+    return [replace(plot, span=(low, high)) for plot in plots]
 
 
 def turned_hue(colour: Colour, place: int) -> Colour:

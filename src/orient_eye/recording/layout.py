@@ -84,8 +84,13 @@ def blueprint(
         return [_gaze_view(scene, [f"{s.root}/scene" for s in shown])] if scene.graticule.around_deg else []
 
     def tab(saccade: SaccadeTab) -> rrb.Horizontal:
-        beside = [_plot(p, [saccade], until_s=until_s) for p in plots] + listing([saccade])
         eye = _eye_view(scene, "eye", [f"{saccade.root}/scene/**"])
+        if any(p.row for p in plots):
+            more = [*gaze([saccade]), *listing([saccade])]
+            views = rrb.Vertical(eye, *more, row_shares=[2, *(1 for _ in more)])
+            rows = rrb.Vertical(*_rows(plots, saccade, until_s))
+            return rrb.Horizontal(views, rows, column_shares=[2, 3], name=saccade.title)
+        beside = [_plot(p, [saccade], until_s=until_s) for p in plots] + listing([saccade])
         return rrb.Horizontal(
             rrb.Vertical(eye, *gaze([saccade])), rrb.Grid(*beside, grid_columns=2), name=saccade.title
         )
@@ -141,10 +146,22 @@ def sequence_blueprint(
         growing = [f"{root}/listing/path", f"{root}/listing/ends"]
         views.append(_vectors_view(vectors, [f"{root}/listing/**"], growing=growing))
     left = rrb.Vertical(eye, rrb.Horizontal(*views)) if views else eye
-    shares = [max(5, 2 + 1.3 * p.legend) for p in plots]  # so that legends have room
-    curves = rrb.Vertical(*(_plot(p, [sequence], until_s=1.15 * lasts_s) for p in plots), row_shares=shares)
+    until_s = 1.15 * lasts_s
+    if any(p.row for p in plots):
+        curves = rrb.Vertical(*_rows(plots, sequence, until_s))
+    else:
+        shares = [max(5, 2 + 1.3 * p.legend) for p in plots]  # so that legends have room
+        curves = rrb.Vertical(*(_plot(p, [sequence], until_s=until_s) for p in plots), row_shares=shares)
     shown = rrb.Horizontal(left, curves, name=sequence.title)
     return _whole([shown, rrb.TextDocumentView(origin="/info", name="info")], _SEQUENCE_SPEED)
+
+
+def _rows(plots: Sequence[Plot], saccade: SaccadeTab, until_s: float) -> list[Any]:
+    """Plots of a saccade in their rows."""
+    import rerun.blueprint as rrb
+
+    rows = [[p for p in plots if p.row == row] for row in dict.fromkeys(p.row for p in plots)]
+    return [rrb.Horizontal(*(_plot(p, [saccade], until_s=until_s) for p in row)) for row in rows]
 
 
 def _eye_view(scene: Scene, name: str, contents: list[str], growing: Sequence[str] = ()) -> Any:
@@ -190,7 +207,14 @@ def _plot(which: Plot, shown: Sequence[SaccadeTab], name: str = "", until_s: flo
 
     low, high = which.span
     margin = 0.05 * max(high - low, 1e-3)
-    recoloured: Any = {f"{s.root}/{which.series[0]}": rr.SeriesLines(colors=[s.colour]) for s in shown}
+    styled: Any = {}
+    if which.shaded:
+        styled = {f"{s.root}/{which.series[0]}": rr.SeriesLines(colors=[s.colour]) for s in shown}
+    elif len(shown) == 1:
+        for label, path in zip(which.labels, which.series, strict=False):
+            for part in ("", "reference "):
+                called = rr.SeriesLines.from_fields(names=[part + label])
+                styled[f"{shown[0].root}/{part.replace(' ', '/')}{path}"] = called
     return rrb.TimeSeriesView(
         origin="/" if len(shown) > 1 else shown[0].root,
         contents=[f"{s.root}/{part}{path}" for s in shown for path in which.series for part in ("", "reference/")],
@@ -198,7 +222,7 @@ def _plot(which: Plot, shown: Sequence[SaccadeTab], name: str = "", until_s: flo
         axis_x=None if until_s is None else rrb.TimeAxis(view_range=_from_the_beginning(until_s)),
         axis_y=rrb.ScalarAxis(range=(low - margin, high + margin)),
         plot_legend=rrb.PlotLegend("righttop", visible=which.legend > 0 and len(shown) == 1),
-        overrides=recoloured if which.shaded else None,
+        overrides=styled or None,
     )
 
 

@@ -12,8 +12,8 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
-from orient_eye.eyes.model import motors, tendon_tension
-from orient_eye.motor import names
+from orient_eye.eyes.model import Tendons, motors
+from orient_eye.motor import names, rests
 from orient_eye.movement.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -66,9 +66,15 @@ class Poses:
             counts.append(len(strips) - before)
         return strips, np.array(tendons, np.intp), np.array(counts, np.intp)
 
+    def middle(self, saccade: int) -> Array:
+        """Middle of the last piece of each tendon of a saccade [m], (time, tendons, 3)."""
+        last = (self.path_start + self.path_count)[saccade, ..., None] - 1
+        one, other = (np.take_along_axis(self.path[saccade], point, axis=1) for point in (last, last - 1))
+        return np.asarray((one + other) / 2)
+
 
 def pose(model: mujoco.MjModel, trajectory: Trajectory) -> Poses:
-    """Poses of all bodies and tendons; motors that the trajectory does not have, or not know (NaN), stand at 0.
+    """Poses of all bodies and tendons; motors that the trajectory does not have, or not know (NaN), stand at rest.
 
     A model without motors shows only how the eye turns.
 
@@ -95,17 +101,22 @@ def pose(model: mujoco.MjModel, trajectory: Trajectory) -> Poses:
     ok = ~np.repeat(trajectory.failed, trajectory.time.size)
     eye = int(model.joint("eye").qposadr[0]) + np.arange(4)
     batch.qpos[np.ix_(ok, eye)] = trajectory.orientation.reshape(-1, 4)[ok]
+    rest = np.deg2rad(rests(motors(model)))
+    control = np.tile(rest, (*trajectory.orientation.shape[:2], 1))
     for i, name in enumerate(trajectory.motor_names):
         if name in own:
-            joint, gear = model.joint(model.actuator(name).trnid[0]), float(model.actuator(name).gear[0])
-            angle = np.deg2rad(np.nan_to_num(trajectory.motor[..., i])) / gear
-            batch.qpos[ok, joint.qposadr[0]] = angle.ravel()[ok]
+            actuator, known = model.actuator(name), trajectory.motor[..., i]
+            angle = np.where(np.isfinite(known), np.deg2rad(known), rest[own.index(name)])
+            control[..., own.index(name)] = angle
+            if actuator.trntype[0] == mujoco.mjtTrn.mjTRN_JOINT:
+                joint = model.joint(actuator.trnid[0])
+                batch.qpos[ok, joint.qposadr[0]] = (angle / float(actuator.gear[0])).ravel()[ok]
     batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
 
     def shaped(name: str, *shape: int) -> Any:
         return bound[name].reshape(*trajectory.orientation.shape[:2], *shape)
 
-    tension = tendon_tension(model, shaped("ten_length", model.ntendon))
+    tension = Tendons.of(model).tension(shaped("ten_length", model.ntendon), control)
     if trajectory.tension is not None and set(tendon_names(model)) <= set(trajectory.tendon_names):
         tension = trajectory.tension[..., [trajectory.tendon_names.index(name) for name in tendon_names(model)]]
     return Poses(

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from orient_eye import rotations
 from orient_eye.recording.directions import Graticule, ring
 from orient_eye.recording.geometry import geometry
+from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.poses import Poses
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ class Scene:
         poses: of the batch.
         drawn: the saccades that will be drawn.
         graticule: the lines ahead of the eye by which its gaze is read.
+        muscles: what the tendons are, to write their names to them; None for tendons without names.
 
     Attributes:
         reach: length of the line of sight, from the centre of the eye [m].
@@ -71,8 +73,16 @@ class Scene:
         behind, ahead: the same, to see the whole net as the eye itself does.
     """
 
-    def __init__(self, model: mujoco.MjModel, poses: Poses, drawn: list[int], *, graticule: Graticule) -> None:
-        self.model, self.poses, self.graticule = model, poses, graticule
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        poses: Poses,
+        drawn: list[int],
+        *,
+        graticule: Graticule,
+        muscles: Muscles | None = None,
+    ) -> None:
+        self.model, self.poses, self.graticule, self.muscles = model, poses, graticule, muscles
         sites = [model.site(i).name for i in range(model.nsite)]
         self._shapes = [geometry(model, body) for body in range(model.nbody)]
         self.gaze_start = model.site("gaze").pos.copy() if "gaze" in sites else np.zeros(3)
@@ -135,6 +145,8 @@ class Scene:
             rec.send_columns(f"{path}/{self._name(body)}", when, stands)
         self._draw_gaze(rec, f"{path}/{self.gaze}", colour)
         self._draw_tendons(rec, f"{path}/tendons", saccade, time)
+        if self.muscles:
+            self._draw_names(rec, f"{path}/muscles", saccade, time, self.muscles.names)
 
     def draw_reference(self, rec: "rr.RecordingStream", path: str, orientation: Array, time: Array) -> None:
         """The line of sight of another trajectory in grey, and its way; orientation (time, 4), time (time,) [s]."""
@@ -210,6 +222,18 @@ class Scene:
             colours = tension_colours(self.poses.tension[saccade, row, tendon], self.tension_top)
             columns = rr.LineStrips3D.columns(strips=strips, colors=colours).partition(counts)
             rec.send_columns(path, [rr.TimeColumn(TIMELINE, duration=time[rows])], columns)
+
+    def _draw_names(
+        self, rec: "rr.RecordingStream", path: str, saccade: int, time: Array, names: Sequence[str]
+    ) -> None:
+        """Names of the tendons (tendons,), each in the middle of its last piece."""
+        import rerun as rr
+
+        thin = float(self.model.tendon_width.max())
+        style = rr.Points3D.from_fields(labels=names, show_labels=True, radii=[thin], colors=[MOMENT_COLOUR])
+        rec.log(path, style, static=True)
+        columns = rr.Points3D.columns(positions=self.poses.middle(saccade).reshape(-1, 3))
+        rec.send_columns(path, [rr.TimeColumn(TIMELINE, duration=time)], columns.partition([len(names)] * len(time)))
 
     def _draw_body(self, rec: "rr.RecordingStream", path: str, body: int) -> bool:
         """Whether there is anything to draw."""

@@ -16,6 +16,7 @@ from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording import titles as naming
 from orient_eye.recording.curves import Curves
 from orient_eye.recording.layout import SaccadeTab, saccade_colours, sequence_blueprint
+from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.rotation_vectors import RotationVectors
 from orient_eye.recording.scene import Scene
@@ -75,10 +76,10 @@ def record_sequence(
     colours = saccade_colours(numbered)
     tab = SaccadeTab(0, "/sequence", "sequence", "", colours[0])
     model = ball() if model is None else model
-    poses = pose(model, sequence)
+    poses, muscles = pose(model, sequence), Muscles.of(model)
     wanted = None if target is None else np.repeat(target, samples, axis=0)[None]
-    curves = Curves(sequence, [0], poses.tension, tendon_names(model), target=wanted)
-    scene = Scene(model, poses, [0], graticule=curves.graticule)
+    curves = Curves(sequence, [0], poses.tension, tendon_names(model), target=wanted, muscles=muscles)
+    scene = Scene(model, poses, [0], graticule=curves.graticule, muscles=muscles)
     vectors = RotationVectors(sequence.orientation[0]) if "torsion" in curves.turns else None
     plots = curves.plots()
 

@@ -1,7 +1,7 @@
 """What the figures of the report are functions of: loaded or computed once, when it is first asked for.
 
 evidence = Evidence()                            # the shipped policies
-evidence = Evidence([Path("runs/mine")])         # a run instead of the shipped policy of its plant and case
+evidence = Evidence([Path("runs/mine")])         # a run instead of the shipped policy of its kind
 evidence.policy("lpf", "2-varying").pairs        # its evaluation saccades, with the searched optimum
 """
 
@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 COURSE = "metrics.csv"
 """How a training went, beside its policy."""
 _OF_COURSE = ("saccades", "reward_mean", "gap_mean")
+EYE = "thesis"
+"""Of a plant that names none."""
 STEPS_DEG = tuple(float(a) for a in range(1, 26))
 """Amplitudes of the motor's steps, as `orient-eye sysid` takes them."""
 MAIN_SEQUENCE_DEG = np.array([1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12.5, 15, 17.5, 20, 25, 30, 35, 40, 50, 60], float)
@@ -69,11 +71,12 @@ class Judged:
     @property
     def title(self) -> str:
         """Plant and case in words, and which run it is of where it is not shipped."""
-        case, targets = self.policy.manifest.get("case"), self.task.targets.name
+        _, eye, case, targets = _kind(self.policy)
         words = [
             self.task.plant.name,
+            *([] if eye == EYE else [f"eye {eye}"]),
             *([f"case {case}"] if case else []),
-            *([] if targets == "horizontal" else [targets]),
+            *([targets] if targets not in (None, "horizontal") else []),
         ]
         mine = "" if self.name in shipped_policies() else f" ({self.name})"
         return ", ".join(words) + mine
@@ -115,9 +118,14 @@ class Judged:
         return above(self.sizes.trajectory, of="gaze" if self.task.judge == "gaze" else "orientation")
 
     @cached_property
+    def random(self) -> Saccades:
+        """The random saccades."""
+        return Saccades.of(self.task, self.policy, self.pairs.start, self.pairs.target)
+
+    @cached_property
     def gaze_numbers(self) -> dict[str, Any]:
         """Of the random saccades in all directions."""
-        return gaze_numbers(Saccades.of(self.task, self.policy, self.pairs.start, self.pairs.target))
+        return gaze_numbers(self.random)
 
     @cached_property
     def gaze_pictures(self) -> dict[str, Figure]:
@@ -129,8 +137,8 @@ class Evidence:
     """Policies, an identification and studies, each made when it is first asked for.
 
     Args:
-        runs: run directories of `orient-eye train`, each in place of the shipped policy of the same plant, case and
-            targets, or beside them.
+        runs: run directories of `orient-eye train`, each in place of the shipped policy of the same plant, eye, case
+            and targets, or beside them.
         pairs: random saccades on which each policy is judged; None for as many as it was trained with.
 
     Raises:
@@ -160,19 +168,20 @@ class Evidence:
         """Of all policies."""
         return tuple(self._policies)
 
-    def policy(self, plant: str, case: str, targets: str | None = None) -> Judged:
-        """The policy of a plant, a case, and a set of targets; None for any about one axis.
+    def policy(self, plant: str, case: str, targets: str | None = None, *, eye: str = EYE) -> Judged:
+        """The policy of a plant with an eye, a case, and a set of targets; None for any about one axis.
 
         Raises:
             InputError: there is none.
         """
         for name, policy in self._policies.items():
-            of_plant, of_case, of_targets = _kind(policy)
-            if (of_plant, of_case) == (plant, case) and targets in (None, of_targets):
+            *of, of_targets = _kind(policy)
+            if of == [plant, eye, case] and targets in (None, of_targets):
                 return self.judged(name)
+        options = ("" if eye == EYE else f" --eye {eye}") + ("" if targets is None else f" --targets {targets}")
         raise InputError(
             f"the report has no policy of plant {plant!r} and case {case!r}; give the run directory of one, which "
-            f"orient-eye train --plant {plant} --case {case} makes"
+            f"orient-eye train --plant {plant}{options} --case {case} makes"
         )
 
     def judged(self, name: str) -> Judged:
@@ -198,6 +207,8 @@ class Evidence:
         return dict(read_json(data_folder("models") / "studies.json", hint="install orient-eye again"))
 
 
-def _kind(policy: Policy) -> tuple[str, str | None, str | None]:
+def _kind(policy: Policy) -> tuple[str, str, str | None, str | None]:
+    """Plant, eye, case and targets."""
     task = policy.manifest["task"]
-    return task["plant"].get("plant"), policy.manifest.get("case"), task.get("targets", {}).get("targets")
+    plant, case = task["plant"], policy.manifest.get("case")
+    return plant.get("plant"), plant.get("eye", EYE), case, task.get("targets", {}).get("targets")

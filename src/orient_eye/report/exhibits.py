@@ -1,7 +1,7 @@
 """All figures of the report, in the order in which it shows them."""
 
 from orient_eye.registry import Registry
-from orient_eye.report import chapter2, chapter3, chapter4, chapter5, left_open, likeness, ours
+from orient_eye.report import chapter2, chapter3, chapter4, chapter5, left_open, likeness, ours, six
 from orient_eye.report.exhibit import Exhibit
 
 EXHIBITS: Registry[Exhibit] = Registry(
@@ -12,6 +12,7 @@ EXHIBITS: Registry[Exhibit] = Registry(
         **chapter4.EXHIBITS,
         **chapter5.EXHIBITS,
         **ours.EXHIBITS,
+        **six.EXHIBITS,
         **left_open.EXHIBITS,
         **likeness.EXHIBITS,
     },

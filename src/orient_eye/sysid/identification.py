@@ -22,7 +22,7 @@ from orient_eye.surrogate import Surrogate
 from orient_eye.sysid.comparison import Compared, HeldOut, compare, predict, preferred
 from orient_eye.sysid.fit import CONFIDENCE, Fit, fit_model
 from orient_eye.sysid.models import MODELS, Model
-from orient_eye.sysid.plant_steps import plant_steps
+from orient_eye.sysid.plant_steps import listed, plant_steps
 from orient_eye.sysid.prototype_log import is_log
 from orient_eye.sysid.recording_checks import doubts_of, warnings_of
 from orient_eye.sysid.step_response import StepResponse
@@ -123,6 +123,9 @@ def identify_plant(
     if not asked:
         raise InputError("no step amplitude given; name at least one, in deg of motor, as 5 10 20")
     done = plant_steps(plant, [*asked, *(a for a in held_out if a not in asked)], motor, axis)
+    asked = [a for a in asked if a in done.amplitudes]
+    if not asked:
+        raise InputError(f"no step is left to fit, choose smaller ones: {done.warnings[-1]}")
     steps, judges = done.steps[: len(asked)], done.steps[len(asked) :]
     fits = tuple((fit_model(MODELS["first_order"], [step]),) for step in steps)
     A = np.array(asked, float)
@@ -142,7 +145,9 @@ def identify_plant(
             f"w0 of the surrogate is that at {A[nearest]:g} {done.motor.unit}, the step nearest to {REFERENCE_DEG:g}"
         )
     unit, identity = done.motor.unit, plant.identity()
-    steps_done = f"steps of {done.motor.name} to {_listed(A)} {unit} on {plant_in_words(identity)}"
+    off = f"by {listed(asked)} {unit} from its rest at {done.motor.rest:.4g} {unit}"
+    way = off if done.motor.rest else f"to {listed(asked)} {unit}"
+    steps_done = f"steps of {done.motor.name} {way} on {plant_in_words(identity)}"
     undetermined: tuple[str, ...] = ()
     if model == "first_order":
         numbers: dict[str, Any] = {"K": gain, "w0": w0.value}
@@ -165,6 +170,7 @@ def identify_plant(
         speed_limit=done.motor.speed_limit,
         acceleration_limit=done.motor.acceleration_limit,
         amplitudes=(float(np.abs(A).min()), float(np.abs(A).max())),
+        rest=done.motor.rest,
         **numbers,
     )
     return Identification(
@@ -303,8 +309,3 @@ def _unlike_zero(steps: Sequence[StepResponse], fit: Fit) -> list[str]:
         f"target would land so much beside it: the motor should read {middle / fit['K'].value:+.2f} deg more there, "
         "or the eye's sensor so much less"
     ]
-
-
-def _listed(amplitudes: Any) -> str:
-    values = [f"{a:g}" for a in amplitudes]
-    return ", ".join(values) if len(values) <= 4 else f"{values[0]}, {values[1]}, ..., {values[-1]}"

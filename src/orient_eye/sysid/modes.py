@@ -7,10 +7,13 @@
 Gains come from the orientations in which the eye rests, poles from how it moves: first steps, of each motor alone and
 of all together, then pulse-steps of all motors between random orientations, with k0 near the poles that the steps
 showed. Others like these judge.
+
+More motors than axes hold an eye in many ways. They then stand where `Plant.hold` has them, and off that in the ways
+that turn nothing, so that the gain of each is seen; and the workspace is that part of the usual in which they hold it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any
 
@@ -24,8 +27,8 @@ from orient_eye.commands import Command, Sampled
 from orient_eye.commands.pulse_step import PulseStep
 from orient_eye.constants import YAW_LIMIT_DEG
 from orient_eye.errors import InputError
-from orient_eye.modal_surrogate import MODES, ModalSurrogate, Mode, as_vector
-from orient_eye.motor import ranges
+from orient_eye.modal_surrogate import MODES, ModalSurrogate, Mode, as_orientation, as_vector
+from orient_eye.motor import ranges, rests
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants import Plant
 from orient_eye.plants.linear_response import sampled_response
@@ -47,6 +50,11 @@ MOST = 10_000
 """Pulse-steps that are simulated at once: 0.5 GB."""
 RINGS_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, np.inf)
 """Ends of the rings of eccentricity."""
+SHARED_DEG = 10.0
+"""By how much motors that are more than the axes go off least change; that part is taken that turns nothing."""
+_NEAR = 0.7  # of the way to where the eye is not held: pulses overshoot
+_DIRECTIONS = 24
+_LEAST_KEPT = 0.5  # of the pulse-steps
 _STEP_DEG = 1.0  # of a motor, to see which way it turns the eye
 _TURNS = 1e-3  # of the largest gain about an axis: less is another axis' business
 _LEAST_GAIN = 1e-3  # deg of eye per deg of motor: less turns no eye
@@ -69,6 +77,8 @@ class ModesIdentification:
         orders: the same of first and of second order, by `ORDERS`.
         held_out: pulse-steps that were not fitted, as the plant made them.
         predicted: what each order makes of the same motors, orientations (saccades, time, 4).
+        workspace_deg: starts and ends look up to here from straight ahead.
+        ran_away: pulse-steps, fitted or held out, that went to where the motors do not hold the eye: left out.
     """
 
     surrogate: ModalSurrogate
@@ -76,6 +86,8 @@ class ModesIdentification:
     orders: Mapping[str, ModalSurrogate]
     held_out: Trajectory
     predicted: Mapping[str, Array]
+    workspace_deg: float = WORKSPACE_DEG
+    ran_away: int = 0
 
     @cached_property
     def error_deg(self) -> Mapping[str, Array]:
@@ -136,7 +148,7 @@ def identify_modes(
     """Identify a plant with all its motors.
 
     Args:
-        plant: any of three motors that turn the eye about three axes.
+        plant: any of three motors or more that turn the eye about three axes.
         random: of what its motors are told.
         fitted: pulse-steps from which the poles are found.
         held_out: pulse-steps to judge by.
@@ -151,19 +163,21 @@ def identify_modes(
     for name, count in (("fitted", fitted), ("held out", held_out)):
         whole(f"the number of pulse-steps {name}", count, 1, MOST, advice="200 and 400 are usual")
     real("what a second order is worth", worth, 0, 1, advice="it is a share of the first order's error")
-    slope = _slope(plant)
-    K = _gains(plant, slope, random)
-    rates = [mode.w0 for mode in _fit(_steps(plant, slope, random), K, "first_order").values()]
+    eye = _Eye.of(plant)
+    K = _gains(eye, random)
+    rates = [mode.w0 for mode in _fit(_steps(eye, random), K, "first_order", eye.rest).values()]
     near = np.array(rates, dtype=float)[np.abs(K).argmax(axis=0)]
-    seen = _pulse_steps(plant, slope, near, fitted, random)
-    judges = _pulse_steps(plant, slope, near, held_out, random)
+    seen = _pulse_steps(eye, near, fitted, random)
+    judges = _pulse_steps(eye, near, held_out, random)
+    ran_away = fitted + held_out - len(seen) - len(judges)
     identity, mechanical = plant.identity(), ranges(plant.motors)
     known: dict[str, Any] = {
         "motors": tuple(motor.name for motor in plant.motors),
         "ranges": mechanical.tolist() if np.isfinite(mechanical).all() else None,
         "eye": identity.get("eye"),
+        "rest": tuple(eye.rest.tolist()),
     }
-    orders = {name: ModalSurrogate(modes=_fit(seen, K, name), **known) for name in ORDERS}
+    orders = {name: ModalSurrogate(modes=_fit(seen, K, name, eye.rest), **known) for name in ORDERS}
     start = State(judges.orientation[:, 0], judges.motor[:, 0], judges.angular_velocity[:, 0])
     predicted = {
         name: ModalPlant(candidate, step_s=plant.step_s).run(judges.motor, start)[0]
@@ -174,8 +188,10 @@ def identify_modes(
         order = ORDERS[int(rms["second_order"] < (1 - worth) * rms["first_order"])]
     words = f"{len(seen)} pulse-steps of all motors on {plant_in_words(identity)}; {order.replace('_', ' ')}"
     details = {"plant": identity, "held_out_rms_deg": rms, "held_out": len(judges)}
+    if eye.redundant:
+        details |= {"workspace_deg": eye.workspace_deg, "ran_away": ran_away}
     surrogate = ModalSurrogate(modes=orders[order].modes, source=words, details=details, **known)
-    return ModesIdentification(surrogate, order, orders, judges, predicted)
+    return ModesIdentification(surrogate, order, orders, judges, predicted, eye.workspace_deg, ran_away)
 
 
 def _rounded(values: NDArray[np.floating[Any]]) -> list[float]:
@@ -187,53 +203,101 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _slope(plant: Plant) -> Array:
-    """Gains at rest with all motors at 0, (3, 3); 0 where a motor does not turn the eye about an axis.
+@dataclass(frozen=True)
+class _Eye:
+    """What is known of a plant before its gains and poles are.
 
-    Raises:
-        InputError: there are not three motors that turn the eye about three axes.
+    Attributes:
+        plant: it.
+        rest: where its motors are when it looks straight ahead, (motors,).
+        slope: gains there, (3, motors); 0 where a motor does not turn the eye about an axis.
+        workspace_deg: starts and ends look up to here from straight ahead.
+        edge_deg: up to here the motors hold it, as far as that is known.
     """
-    steps = _STEP_DEG * np.eye(len(plant.motors))
-    slope = (as_vector(plant.rest(steps)) - as_vector(plant.rest(-steps))).T / (2 * _STEP_DEG)
-    slope[np.abs(slope) < _TURNS * np.abs(slope).max(axis=1, keepdims=True)] = 0
-    axes = int(np.linalg.matrix_rank(slope, tol=_LEAST_GAIN))
-    if len(plant.motors) != 3 or axes < 3:
-        raise InputError(
-            f"the {len(plant.motors)} motors of plant {plant.name!r} turn the eye about {axes} independent axes; "
-            "--all-motors needs three motors and three axes: leave it out, or choose another plant"
-        )
-    return slope
+
+    plant: Plant
+    rest: Array
+    slope: Array
+    workspace_deg: float = WORKSPACE_DEG
+    edge_deg: float = np.inf
+
+    @classmethod
+    def of(cls, plant: Plant) -> "_Eye":
+        """Of a plant.
+
+        Raises:
+            InputError: there are not three motors or more that turn the eye about three axes, and hold it.
+        """
+        rest = rests(plant.motors)
+        moved = _STEP_DEG * np.eye(len(rest))
+        slope = (as_vector(plant.rest(rest + moved)) - as_vector(plant.rest(rest - moved))).T / (2 * _STEP_DEG)
+        slope[np.abs(slope) < _TURNS * np.abs(slope).max(axis=1, keepdims=True)] = 0
+        axes = int(np.linalg.matrix_rank(slope, tol=_LEAST_GAIN))
+        if axes < len(MODES):
+            raise InputError(
+                f"the {len(rest)} motors of plant {plant.name!r} turn the eye about {axes} independent axes; "
+                "--all-motors needs three motors or more and three axes: leave it out, or choose another plant"
+            )
+        eye = cls(plant, rest, slope)
+        if not eye.redundant:
+            return eye
+        edge = _edge(plant)
+        if not edge:
+            raise InputError(f"the motors of plant {plant.name!r} do not hold it next to straight ahead")
+        return replace(eye, workspace_deg=min(WORKSPACE_DEG, round(_NEAR * edge, 1)), edge_deg=edge)
+
+    @property
+    def redundant(self) -> bool:
+        """Whether it has more motors than axes."""
+        return len(self.rest) > len(MODES)
+
+    @property
+    def reach(self) -> Array:
+        """How far each motor works to either side of its rest, (motors,)."""
+        low, high = np.array([motor.working for motor in self.plant.motors]).T
+        return np.asarray(np.minimum(self.rest - low, high - self.rest))
+
+    def drawn(self, count: int, random: np.random.Generator) -> Array:
+        """Rotation vectors evenly over the workspace, (count, 3)."""
+        torsion = random.uniform(-TORSION_DEG, TORSION_DEG, count)
+        far, way = self.workspace_deg * np.sqrt(random.uniform(size=count)), random.uniform(-np.pi, np.pi, count)
+        return np.stack([torsion, far * np.sin(way), far * np.cos(way)], axis=1)
+
+    def motors(self, vector: Array, random: np.random.Generator) -> Array:
+        """Positions (n, motors) for rotation vectors (n, 3).
+
+        Three motors go by the gains at rest, less far where one works less far. More go where they hold the eye, and
+        off that by a random part that turns nothing.
+        """
+        if not self.redundant:
+            off = vector @ np.linalg.inv(self.slope).T
+            far = np.abs(off) / self.reach
+            return np.asarray(self.rest + off / np.maximum(far.max(axis=1, keepdims=True), 1))
+        held = self.plant.hold(as_orientation(vector), tuple(motor.name for motor in self.plant.motors))
+        shared = random.uniform(-SHARED_DEG, SHARED_DEG, held.shape)
+        return held + shared - shared @ (np.linalg.pinv(self.slope) @ self.slope).T
 
 
-def _drawn(count: int, random: np.random.Generator) -> Array:
-    """Rotation vectors evenly over the workspace, (count, 3)."""
-    torsion = random.uniform(-TORSION_DEG, TORSION_DEG, count)
-    far, way = WORKSPACE_DEG * np.sqrt(random.uniform(size=count)), random.uniform(-np.pi, np.pi, count)
-    return np.stack([torsion, far * np.sin(way), far * np.cos(way)], axis=1)
+def _edge(plant: Plant) -> float:
+    """Angle from straight ahead [deg] up to which all motors together hold the eye in all directions."""
+    far = np.arange(1, np.ceil(WORKSPACE_DEG / _NEAR) + 1)
+    way = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    vector = far[:, None, None] * np.stack([0 * way, np.sin(way), np.cos(way)], axis=-1)
+    held = plant.held(as_orientation(vector.reshape(-1, 3)), tuple(motor.name for motor in plant.motors))
+    good = np.isfinite(held).reshape(len(far), -1).all(axis=1)
+    return float(far[np.cumprod(good, dtype=bool)].max(initial=0.0))
 
 
-def _motors(plant: Plant, slope: Array, vector: Array) -> Array:
-    """Positions (n, motors) for rotation vectors (n, 3) by the gains at rest; less far where a motor works less far."""
-    motor = vector @ np.linalg.inv(slope).T
-    far = np.abs(motor) / _reach(plant)
-    return np.asarray(motor / np.maximum(far.max(axis=1, keepdims=True), 1))
-
-
-def _reach(plant: Plant) -> Array:
-    """How far each motor works to either side of 0, (motors,)."""
-    return np.array([min(-motor.working[0], motor.working[1]) for motor in plant.motors])
-
-
-def _gains(plant: Plant, slope: Array, random: np.random.Generator) -> Array:
+def _gains(eye: _Eye, random: np.random.Generator) -> Array:
     """K (3, motors) by least squares over the orientations in which the eye rests, with the zeros of the slope.
 
     With every position all its mirror images: else what is a product of two components (a turned eye's torsion pulls it
     up or down) would pass for a gain.
     """
-    motor = _motors(plant, slope, (_drawn(_RESTS, random)[:, None] * _SIGNS).reshape(-1, 3))
-    vector, K = as_vector(plant.rest(motor)), np.zeros_like(slope)
-    for i, turning in enumerate(slope != 0):
-        K[i, turning] = _rounded(np.linalg.lstsq(motor[:, turning], vector[:, i], rcond=None)[0])
+    motor = eye.motors((eye.drawn(_RESTS, random)[:, None] * _SIGNS).reshape(-1, 3), random)
+    vector, off, K = as_vector(eye.plant.rest(motor)), motor - eye.rest, np.zeros_like(eye.slope)
+    for i, turning in enumerate(eye.slope != 0):
+        K[i, turning] = _rounded(np.linalg.lstsq(off[:, turning], vector[:, i], rcond=None)[0])
     return K
 
 
@@ -252,29 +316,41 @@ def _recorded(plant: Plant, command: Command, begin: Array) -> Trajectory:
     return done
 
 
-def _steps(plant: Plant, slope: Array, random: np.random.Generator) -> Trajectory:
-    """Steps from all motors at 0, of each motor alone to both sides and of all together."""
-    alone = np.minimum(_reach(plant), WORKSPACE_DEG / np.linalg.norm(slope, axis=0))
-    single = np.concatenate([share * np.diag(alone) for share in _SHARES])
-    end = np.concatenate([single, _motors(plant, slope, _drawn(_COMBINED, random))])
-    return _recorded(plant, Sampled(end[:, None], plant.step_s), np.zeros_like(end))
+def _steps(eye: _Eye, random: np.random.Generator) -> Trajectory:
+    """Steps from rest, of all motors together; of three also of each alone to both sides."""
+    end = eye.motors(eye.drawn(_COMBINED, random), random)
+    if not eye.redundant:
+        alone = np.minimum(eye.reach, eye.workspace_deg / np.linalg.norm(eye.slope, axis=0))
+        end = np.concatenate([*(eye.rest + share * np.diag(alone) for share in _SHARES), end])
+    return _recorded(eye.plant, Sampled(end[:, None], eye.plant.step_s), np.tile(eye.rest, (len(end), 1)))
 
 
-def _pulse_steps(plant: Plant, slope: Array, near: Array, count: int, random: np.random.Generator) -> Trajectory:
-    """Of all motors between random orientations, k0 near given rates [1/s] (motors,)."""
-    F, D = np.split(_motors(plant, slope, _drawn(2 * count, random)), 2)
+def _pulse_steps(eye: _Eye, near: Array, count: int, random: np.random.Generator) -> Trajectory:
+    """Of all motors between random orientations, k0 near given rates [1/s] (motors,); without those that ran away.
+
+    Raises:
+        InputError: most did.
+    """
+    F, D = np.split(eye.motors(eye.drawn(2 * count, random), random), 2)
     low, high = np.log(B_RANGE)
     B = np.exp(random.uniform(low, high, F.shape))
     k0 = near * np.exp(random.uniform(-_K0_SPREAD, _K0_SPREAD, F.shape))
-    return _recorded(plant, PulseStep(F, B, D, k0), F)
+    done = _recorded(eye.plant, PulseStep(F, B, D, k0), F)
+    stayed = np.asarray(angle_between_directions(gaze(done.orientation[:, -1]), gaze(FORWARD)) <= eye.edge_deg)
+    if stayed.sum() < _LEAST_KEPT * count:
+        raise InputError(
+            f"from {count - stayed.sum()} of {count} pulse-steps plant {eye.plant.name!r} went where its motors do not "
+            f"hold it, {eye.edge_deg:g} deg from straight ahead; no linear surrogate describes that"
+        )
+    return done[stayed]
 
 
-def _fit(seen: Trajectory, K: Array, order: str) -> dict[str, Mode]:
-    """Modes with these gains whose poles answer best to what the motors did, each axis by itself."""
+def _fit(seen: Trajectory, K: Array, order: str, rest: Array) -> dict[str, Mode]:
+    """Modes with these gains whose poles answer best to what the motors did off their rest, each axis by itself."""
     vector, step_s = as_vector(seen.orientation), float(seen.time[1])
     modes = {}
     for i, axis in enumerate(MODES):
-        true, wanted = vector[..., i], seen.motor @ K[i]
+        true, wanted = vector[..., i], (seen.motor - rest) @ K[i]
         modes[axis] = _fit_axis(true, wanted, tuple(K[i].tolist()), order, step_s)
     return modes
 

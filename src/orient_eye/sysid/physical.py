@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
-from orient_eye.eyes.model import build_model, load_spec, motors
+from orient_eye.eyes.model import Tendons, build_model, load_spec, motors
+from orient_eye.motor import rests
 from orient_eye.plants.equilibrium import rest_orientation
 from orient_eye.rotations import rotation
 from orient_eye.sysid.comparison import HeldOut
@@ -111,9 +112,16 @@ def parameters(eye: str) -> dict[Parameter, float]:
     """What can be fitted of an eye, with its bounds, and the eye's own values.
 
     Raises:
-        InputError: unknown eye, or one whose elastics or friction pull nothing.
+        InputError: unknown eye, one that is wound up by spindles, or one whose elastics or friction pull nothing.
     """
     model = build_model(eye, visual=False)
+    wound = Tendons.of(model).motor
+    if (wound >= 0).any():
+        those = ", ".join(motors(model)[i].name for i in wound if i >= 0)
+        raise InputError(
+            f"--physical fits the elastics of an eye that arms pull, and eye {eye!r} is wound up by spindles, {those}, "
+            "whose stiffness it is: choose another --eye, or identify it without --physical"
+        )
     friction, found = float(_friction(model)[0]), {}
     for group, tendons in _groups(eye).items():
         index = [model.tendon(name).id for name in tendons]
@@ -166,7 +174,7 @@ def fit_physical(
     """
     if not recordings:
         raise InputError("no recording is given; name one or more")
-    sysid, own = _sysid(), parameters(eye)
+    own, sysid = parameters(eye), _sysid()
     free = _free(own, usually_frozen(own) if frozen is None else frozen)
     problem = _Problem.of(eye, own, free, recordings)
     needed = len(free) + problem.constants + 2
@@ -349,7 +357,7 @@ class _Problem:
         begin = np.array([r.motor[0] for r in self.recordings])
         states = np.full((len(begin), size), np.nan)
         try:
-            rest = rest_orientation(torque, begin)
+            rest = rest_orientation(torque, begin, rests(motors(model)))
         except (InputError, np.linalg.LinAlgError):
             return states
         for i, orientation in enumerate(rest):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from orient_eye.constants import ANGLES as AXES
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import build_model, motors
-from orient_eye.motor import Motor
+from orient_eye.motor import Motor, rests
 from orient_eye.rig import Rig
 from orient_eye.rotations import rotation, to_euler
 from orient_eye.sysid import prototype_log
@@ -84,7 +84,7 @@ def read_recordings(
 def read_physical(path: Path, eye_motors: Sequence[Motor], row_times: str = "even", rig: Rig | None = None) -> Measured:
     """Read a recording: a table as `orient-eye simulate` writes it, or a log of the prototype.
 
-    Columns: t_s; a motor's (tau2_deg) where it moved, motors without one stand at 0; q_w, q_x, q_y, q_z, or any of
+    Columns: t_s; a motor's (tau2_deg) where it moved, motors without one stand at rest; q_w, q_x, q_y, q_z, or any of
     yaw_deg, pitch_deg, roll_deg. Others are ignored.
 
     Args:
@@ -107,7 +107,7 @@ def read_physical(path: Path, eye_motors: Sequence[Motor], row_times: str = "eve
     if len(table.lines) < MIN_ROWS:
         raise InputError(f"{path} has {len(table.lines)} rows of numbers; a recording needs at least {MIN_ROWS}")
     time = table.rising_time()
-    motor = np.zeros((len(time), len(eye_motors)))
+    motor = np.tile(rests(eye_motors), (len(time), 1))
     spoken = {} if rig is None else {m.name: m for m in rig.motors}
     columns = {m.name: spoken[m.name].column if m.name in spoken else m.column for m in eye_motors}
     for i, each in enumerate(eye_motors):

@@ -201,7 +201,8 @@ def _surrogate_trajectory(found: Identification, trajectory: Trajectory) -> Traj
     """The surrogate moved as the plant's motor did; None where it cannot follow."""
     plant = make_plant("lpf", surrogate=found.surrogate, step_s=float(trajectory.time[1]))
     motor = trajectory.motor[..., [trajectory.motor_names.index(found.surrogate.motor)]]
-    at_rest = State(trajectory.orientation[:, 0], np.zeros_like(motor[:, 0]))  # from which an ideal step jumps
+    resting = np.full_like(motor[:, 0], found.surrogate.rest)
+    at_rest = State(trajectory.orientation[:, 0], resting)  # from which an ideal step jumps
     try:
         return plant.move(motor, at_rest).trajectory()
     except InputError:  # an eye that starts turned about another axis, as under gravity

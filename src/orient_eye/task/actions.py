@@ -249,7 +249,12 @@ def _finite(working: tuple[float, float]) -> tuple[float, float]:
 
 ACTIONS: Registry[Callable[..., ActionSpace]] = Registry(
     "action",
-    {PulseStepActions.kind: PulseStepActions, "residual": "orient_eye.task.residual_actions:ResidualActions"},
+    {
+        PulseStepActions.kind: PulseStepActions,
+        "residual": "orient_eye.task.residual_actions:ResidualActions",
+        "generators": "orient_eye.task.generator_actions:GeneratorActions",
+        "generator-ratios": "orient_eye.task.generator_actions:GeneratorRatios",
+    },
 )
 """Kind to class; each takes the plant, the driven motors, and options of its own."""
 

@@ -37,6 +37,7 @@ CASES: Registry[Case] = Registry(
         "2-varying": Case("2", "varying", "thesis 5.2.2"),
         "3-fixed": Case("3", None, "thesis 5.3.1"),
         "3-varying": Case("3", "varying", "thesis 5.3.2"),
+        "smooth": Case("smooth", None, "a pulse that begins gently: the motor starts from rest"),
         "human": Case("3", None, "people's main sequence (docs/human.md)", "impatient", (18.0, 300.0)),
     },
     Case,

@@ -17,16 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 from orient_eye import listing, rotations
 from orient_eye.checks import real
 from orient_eye.errors import InputError
-from orient_eye.motor import check_driven, names
+from orient_eye.motor import check_driven, names, redundant
 from orient_eye.movement.measures import View
 from orient_eye.plants import Plant, PulseRates
 from orient_eye.plants.fixation import Fixations
 from orient_eye.state import State, unit
+from orient_eye.task import generator_actions
 from orient_eye.task.targets import HORIZON_S, LEAST_DEG, checked_count
 
 Array = NDArray[np.float64]
-LIMIT_DEG = 30.0
-"""Starts and targets are drawn up to this angle from straight ahead."""
+LIMIT_DEG, REDUNDANT_LIMIT_DEG = 30.0, 25.0
+"""Starts and targets are drawn up to this angle from straight ahead: the second of an eye with more motors than axes,
+which is not stable far to the side of its nose."""
 TORSION_DEG = 0.6
 """Starts have up to so much torsion more or less than that of the least force, as a saccade may have ended."""
 RATES = PulseRates((12.0, 120.0), (2.0, 60.0))
@@ -41,7 +43,7 @@ class GazeTargets:
     Args:
         plant: for which they are made.
         name: of the set, as it is registered.
-        limit_deg: of the cone; less where the motors do not hold it.
+        limit_deg: of the cone; less where the motors do not hold it; None for the usual one.
         torsion_deg: of drawn starts, about that of the least force; less where the motors do not hold it.
         driven: motors to use; None for all.
 
@@ -51,7 +53,6 @@ class GazeTargets:
 
     angles = ("yaw_deg", "pitch_deg")
     of: View = "gaze"
-    actions = "residual"
     learning: Mapping[str, Any] = MappingProxyType(
         {
             "updates": 26_000,
@@ -68,10 +69,13 @@ class GazeTargets:
         plant: Plant,
         *,
         name: str = "gaze",
-        limit_deg: float = LIMIT_DEG,
+        limit_deg: float | None = None,
         torsion_deg: float = TORSION_DEG,
         driven: tuple[str, ...] | None = None,
     ) -> None:
+        many = redundant(plant.motors)
+        self.actions = "generator-ratios" if many else "residual"
+        limit_deg = (REDUNDANT_LIMIT_DEG if many else LIMIT_DEG) if limit_deg is None else limit_deg
         limit_deg = real("the cone of gaze targets", limit_deg, LEAST_DEG, 89.0, unit="deg from straight ahead")
         torsion_deg = real("torsion of starts", torsion_deg, 0.0, 89.0, unit="deg")
         self.plant, self.name = plant, name
@@ -85,7 +89,7 @@ class GazeTargets:
         self.reach_deg = self.fixations.limit_deg
         self.limit_deg = float(min(limit_deg, self.reach_deg))
         self.torsion_deg = self._held(torsion_deg)
-        self.pulse_rates = plant.pulse_rates or RATES
+        self.pulse_rates = plant.pulse_rates or (generator_actions.RATES if many else RATES)
         self.horizon_s = None if plant.horizon_s is None else max(plant.horizon_s, HORIZON_S)
 
     def _held(self, torsion_deg: float) -> float:

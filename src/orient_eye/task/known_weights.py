@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from orient_eye.errors import InputError
 from orient_eye.files import read_json, write_json
+from orient_eye.motor import redundant
 from orient_eye.plants.fixation import knows_elastics
 from orient_eye.resources import data_folder, user_cache
 from orient_eye.task.actions import B_RANGE, K0_RANGE, PulseStepActions
@@ -58,6 +59,10 @@ SLOW_OVERSHOOT = 0.09
 """Weight of the overshoot of saccades in all directions, over that of horizontal ones."""
 FORCE = 0.0075
 """Weight of the force of fixations [1/N^2] over that of the accuracy."""
+CABLES = {"accuracy": 3e9, "energy": 1.0, "duration": 2.5e7, "overshoot": 1e8, "force": 1e7}
+"""Weights on an eye with more motors than axes. By 4.4.5 on B, the scale of D - F and k0 of saccades to the sides of
+the six-motor eye at B = 45 accuracy came to 1.5e9 to 4.2e9, duration to 1.7e7 to 3.7e7, overshoot to 0.7e8 to 1.7e8;
+that of saccades up and down has no solution. The force weighs the motors' squared change beyond the least, 1/rad^2."""
 _GRID, _ROUNDS = 24, 4  # of the search of the fastest saccade
 
 
@@ -114,6 +119,8 @@ def in_all_directions(task: SaccadeTask, error_deg: float | None = None) -> tupl
         task: its weights do not matter.
         error_deg: end-point error with which one can live [deg], at 5 deg; None for 4.4.5.
     """
+    if redundant(task.plant.motors):
+        return dict(CABLES), "rounded from thesis 4.4.5 on the six-motor eye at B = 45 (docs/six.md)"
     targets, plain = make_targets(None, task.plant), task.actions.plain
     of_pulse = {key: plain.identity().get(key) for key in ("pulse", "C", "speed_limit")}
     options = {key: value for key, value in of_pulse.items() if value is not None}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.commands import Command
+from orient_eye.motor import rests
 from orient_eye.plants import Plant, PulseRates
 from orient_eye.plants.fixation import Fixations, Rule
 from orient_eye.state import State
@@ -64,7 +65,7 @@ class ResidualActions(ActionSpace):
         known = plant.motor_rates()[self._plain.index]
         low, high = np.array([(k0.low, k0.high) for k0 in numbers[:, 2]]).T
         self._k0 = np.clip(np.where(np.isfinite(known), known, np.sqrt(low * high)), low, high)
-        at = plant.rest(np.concatenate([np.zeros((1, len(plant.motors))), np.eye(len(plant.motors))]))
+        at = plant.rest(rests(plant.motors) + np.eye(len(plant.motors) + 1, len(plant.motors), -1))
         turned = (rotations.rotation(at[1:]) * rotations.rotation(at[0]).inv()).as_rotvec(degrees=True)
         turned = np.abs(turned[self._plain.index])
         rivals = np.bincount(turned.argmax(axis=1), minlength=3)[turned.argmax(axis=1)]

@@ -19,7 +19,7 @@ from orient_eye import rotations
 from orient_eye.checks import real, whole
 from orient_eye.constants import YAW_LIMIT_DEG
 from orient_eye.errors import InputError
-from orient_eye.motor import check_driven, names
+from orient_eye.motor import check_driven, names, redundant, rests
 from orient_eye.movement.measures import View
 from orient_eye.plants import Plant, PulseRates
 from orient_eye.state import State, unit
@@ -146,7 +146,8 @@ class AxisTargets:
             all that turn it about this axis.
 
     Raises:
-        InputError: no motor of the plant turns the eye about this axis.
+        InputError: no motor of the plant turns the eye about this axis, or there are more motors than axes, which turn
+            it about all of them at once.
     """
 
     of: View = "orientation"
@@ -165,6 +166,11 @@ class AxisTargets:
     ) -> None:
         if axis not in _NAMES:
             raise InputError(f"an axis is {', '.join(_NAMES)}, got {axis!r}")
+        if redundant(plant.motors):
+            raise InputError(
+                f"the {len(plant.motors)} motors of plant {plant.name!r} turn the eye about all axes at once; choose "
+                "the targets gaze"
+            )
         self.plant, self.name, self.axis, self.angles = plant, name or _NAMES[axis], axis, (f"{axis}_deg",)
         self.driven = _turning(plant, axis) if driven is None else driven
         if not self.driven:
@@ -229,7 +235,8 @@ class AxisTargets:
 
 def _effect(plant: Plant) -> Array:
     """Yaw, pitch and roll [deg] (motors, 3) by which a degree of each motor turns the eye from where it rests."""
-    at = plant.rest(np.concatenate([np.zeros((1, len(plant.motors))), np.eye(len(plant.motors))]))
+    count = len(plant.motors)
+    at = plant.rest(rests(plant.motors) + np.eye(count + 1, count, -1))
     turn = rotations.rotation(at[1:]) * rotations.rotation(at[0]).inv()
     return np.stack(rotations.to_euler(turn.as_quat(scalar_first=True)), axis=-1)
 
@@ -246,7 +253,7 @@ def _turning(plant: Plant, axis: str) -> tuple[str, ...]:
 
 def _held(plant: Plant, driven: tuple[str, ...], axis: str) -> tuple[float, float]:
     """Least and largest angle at which the driven motors can hold the eye inside their working range."""
-    motor, effect = np.zeros((33, len(plant.motors))), _effect(plant)[:, _AXES[axis]]
+    motor, effect = np.tile(rests(plant.motors), (33, 1)), _effect(plant)[:, _AXES[axis]]
     for index in check_driven(plant.motors, driven, plant.name):
         low, high = plant.motors[index].working
         sweep = np.linspace(max(low, -1e3), min(high, 1e3), len(motor))
@@ -270,8 +277,8 @@ def make_targets(name: str | None, plant: Plant, **options: Any) -> Targets:
     """The set of that name for a plant.
 
     Args:
-        name: one of `TARGETS`; None for the first about one axis that the plant can make: horizontal, else vertical,
-            else torsional.
+        name: one of `TARGETS`; None for the first that the plant can make: horizontal, else vertical, else torsional,
+            else gaze.
         plant: for which it is made.
         options: of the set.
 
@@ -280,7 +287,7 @@ def make_targets(name: str | None, plant: Plant, **options: Any) -> Targets:
     """
     if name is not None:
         return TARGETS[name](plant, **options)
-    for candidate in _NAMES.values():
+    for candidate in (*_NAMES.values(), "gaze"):
         with contextlib.suppress(InputError):  # the plant does not turn the eye about this axis: the next one
             return TARGETS[candidate](plant, **options)
     return TARGETS["horizontal"](plant, **options)

@@ -8,6 +8,8 @@ without pyplot. Gaze is told to the left and up of straight ahead (`orient_eye.m
 the eye sees it, left on the left. Torsion and rotation vectors are those of `orient_eye.listing`.
 """
 
+from orient_eye.figures.gaze.antagonists import antagonist_correlation, antagonists_over_time
+from orient_eye.figures.gaze.beside_group import main_sequence_beside_group
 from orient_eye.figures.gaze.components import component_velocities
 from orient_eye.figures.gaze.listing import listing_plane, torsion_over_time
 from orient_eye.figures.gaze.main_sequence import main_sequence
@@ -17,10 +19,13 @@ from orient_eye.figures.gaze.sequence import saccade_sequence
 from orient_eye.figures.gaze.statics import torsion_maps, workspace
 
 __all__ = [
+    "antagonist_correlation",
+    "antagonists_over_time",
     "component_velocities",
     "gaze_paths",
     "listing_plane",
     "main_sequence",
+    "main_sequence_beside_group",
     "motors_over_time",
     "saccade_sequence",
     "torsion_maps",

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from orient_eye.figures import tidy
 from orient_eye.figures.gaze.human import draw_human, draw_human_duration
-from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL
+from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL, axial
 from orient_eye.movement.main_sequence import fit_peak_velocity
 from orient_eye.movement.measures import Measures
 from orient_eye.movement.oblique import end_of_shift
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-_AXIAL_DEG = 15.0  # from an axis: nearer to it a saccade is no oblique one
 _LEAST = 3  # saccades through which a line is drawn
 
 
@@ -40,8 +39,7 @@ def main_sequence(trajectory: Trajectory, measures: Measures) -> Figure:
     peak, duration = figure.subplots(1, 2)
     end = end_of_shift(trajectory, measures)
     usable = np.isfinite(end).all(axis=1) & measures.settled & (measures.amplitude_deg > 0)
-    angle = np.rad2deg(np.arctan2(np.abs(end[:, 1]), np.abs(end[:, 0])))
-    horizontal, vertical = angle <= _AXIAL_DEG, angle >= 90 - _AXIAL_DEG
+    horizontal, vertical = axial(end)
     directions: tuple[tuple[str, dict[str, Any], NDArray[np.bool_]], ...] = (
         ("horizontal", {"color": HORIZONTAL, "marker": "o"}, horizontal),
         ("vertical", {"color": VERTICAL, "marker": "^"}, vertical),

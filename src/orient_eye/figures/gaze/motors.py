@@ -18,7 +18,7 @@ _SAME = 1e-6  # of a motor's unit
 _DASHES = ("-", "--", ":", "-.")
 
 
-def motors_over_time(trajectory: Trajectory, measures: Measures) -> Figure:
+def motors_over_time(trajectory: Trajectory, measures: Measures, pairs: NDArray[np.intp] | None = None) -> Figure:
     """Positions and speeds of the motors, and tensions of the elastics where there are any, over time.
 
     The command is drawn dotted where a motor was elsewhere. An elastic that is named after a motor has its colour.
@@ -26,6 +26,8 @@ def motors_over_time(trajectory: Trajectory, measures: Measures) -> Figure:
     Args:
         trajectory: of the saccades, a column each.
         measures: of their gaze.
+        pairs: of antagonists among motors that wind up a cable each, in their order, (pairs, 2): two have one colour,
+            the second is dashed. None for other eyes.
     """
     time, unit = 1e3 * trajectory.time, trajectory.motors[0].unit
     speed = np.gradient(trajectory.motor, trajectory.time, axis=1, edge_order=2)
@@ -34,10 +36,10 @@ def motors_over_time(trajectory: Trajectory, measures: Measures) -> Figure:
         panels.append(("tension [N]", trajectory.tension))
     figure = Figure(figsize=(2.2 + 3.2 * len(trajectory), 0.8 + 2.4 * len(panels)), layout="constrained")
     rows = figure.subplots(len(panels), len(trajectory), sharex=True, sharey="row", squeeze=False)
-    for line, (label, values), styles in zip(rows, panels, _styles(trajectory), strict=False):
+    for line, (label, values), styles in zip(rows, panels, _styles(trajectory, pairs), strict=False):
         for axes, saccade in zip(line, values, strict=True):
-            for (name, style), curve in zip(styles.items(), saccade.T, strict=True):
-                axes.plot(time, curve, lw=1.3, label=name, **style)
+            for name, (column, style) in styles.items():
+                axes.plot(time, saccade[:, column], lw=1.3, label=name, **style)
             tidy(axes)
         line[0].set_ylabel(label)
         line[-1].legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -52,17 +54,24 @@ def motors_over_time(trajectory: Trajectory, measures: Measures) -> Figure:
     return figure
 
 
-def _styles(trajectory: Trajectory) -> list[dict[str, dict[str, Any]]]:
-    """How the curves of each panel are drawn, by name."""
+def _styles(trajectory: Trajectory, pairs: NDArray[np.intp] | None) -> list[dict[str, tuple[int, dict[str, Any]]]]:
+    """How the curves of each panel are drawn, by name: which column, in which style."""
     motors, tendons = trajectory.motor_names, trajectory.tendon_names
+    if pairs is not None:
+        muscles = {
+            motors[i]: (i, {"color": colour, "ls": dash})
+            for pair, colour in zip(pairs.tolist(), palette(len(pairs)), strict=True)
+            for i, dash in zip(pair, _DASHES, strict=False)
+        }
+        return [muscles, muscles, muscles]
     of_motor = dict(zip(motors, palette(len(motors)), strict=True))
     dashes = {motor: count() for motor in motors}
-    elastics = {}
+    elastics: dict[str, dict[str, Any]] = {}
     for tendon, colour in zip(tendons, palette(len(tendons)), strict=True):
         motor = next((name for name in motors if tendon.startswith(name)), None)
         if motor is None:
             elastics[tendon] = {"color": colour}
         else:
             elastics[tendon] = {"color": of_motor[motor], "ls": _DASHES[next(dashes[motor]) % len(_DASHES)]}
-    driven = {name: {"color": colour} for name, colour in of_motor.items()}
-    return [driven, driven, elastics]
+    driven: dict[str, dict[str, Any]] = {name: {"color": colour} for name, colour in of_motor.items()}
+    return [{name: (i, of[name]) for i, name in enumerate(of)} for of in (driven, driven, elastics)]

@@ -13,6 +13,7 @@ from orient_eye.movement.trajectory import Trajectory
 Array = NDArray[np.float64]
 HORIZONTAL, VERTICAL, OBLIQUE, HUMAN = DATA, MODEL, OTHER, "#8a8a8a"
 _LINGER = 1.25  # of the longest duration is shown
+_AXIAL_DEG = 15.0  # from an axis: nearer to it a saccade is no oblique one
 
 
 def colours(count: int) -> list[tuple[float, float, float, float]]:
@@ -31,6 +32,12 @@ def way(end: Array) -> str:
     parts = ((end[0], "left", "right"), (end[1], "up", "down"))
     told = [f"{abs(size):.1f} {one if size > 0 else other}" for size, one, other in parts if abs(size) >= 0.05]
     return ", ".join(told) + " [deg]" if told else "no shift"
+
+
+def axial(shift: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which shifts of the gaze (n, 2), left and up, are horizontal, and which vertical, (n,) each."""
+    angle = np.rad2deg(np.arctan2(np.abs(shift[:, 1]), np.abs(shift[:, 0])))
+    return angle <= _AXIAL_DEG, angle >= 90 - _AXIAL_DEG
 
 
 def palette(count: int) -> list[Any]:

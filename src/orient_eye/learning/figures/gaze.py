@@ -11,7 +11,7 @@ from orient_eye.figures import gaze as of_any_saccades
 from orient_eye.figures import tidy
 from orient_eye.figures.gaze.human import draw_human
 from orient_eye.figures.gaze.paths import draw_paths
-from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL, colours, end_ms, way
+from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL, axial, colours, end_ms, way
 from orient_eye.learning.directions import angles_toward, opposite
 from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.figures.saccades import BEST, LEARNED, Saccades, titled
@@ -25,6 +25,8 @@ from orient_eye.movement.oblique import (
     toward,
     transient_torsion,
 )
+from orient_eye.recording.muscles import Muscles
+from orient_eye.task.generator_actions import GeneratorActions
 from orient_eye.task.saccade import SaccadeTask
 
 if TYPE_CHECKING:
@@ -35,8 +37,8 @@ _SPOKES, _FAR = 8, 0.7  # directions of the shown paths, and how far of the rang
 _OBLIQUE_DEG = np.array([[8.7, 5.0], [5.0, 8.7], [5.0, -8.7], [17.3, 10.0], [10.0, 17.3]])  # left, up
 _MAIN_SEQUENCE_DEG = (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 13.0, 16.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 _EVERY_DEG = 30.0  # directions of the main sequence
-_AXIAL_DEG = 15.0  # from an axis: nearer to it a saccade is no oblique one
 _MOTORS_DEG = 20.0
+_BETWEEN = np.array([0, 1, 3])  # of the few: a horizontal, a vertical and an oblique saccade
 _EVERY_SAMPLE = 5  # of those on the way that Listing's plane shows
 
 
@@ -55,7 +57,7 @@ def gaze_page(policy: Policy, yardstick: Yardstick) -> Figure:
     draw_paths(paths, shown.trajectory, shown.of_gaze, shown.target)
     paths.set_title("paths of the gaze")
     _draw_components(components, Saccades.between(task, policy, _from_ahead(task, _OBLIQUE_DEG[[0, -1]])))
-    _draw_main_sequence(peak, _main_sequence(task, policy))
+    _draw_main_sequence(peak, main_sequence_saccades(task, policy))
     _draw_plane(plane, made, best)
     _draw_torsion(torsion, made)
     _draw_gap(gap, policy, yardstick)
@@ -63,7 +65,7 @@ def gaze_page(policy: Policy, yardstick: Yardstick) -> Figure:
 
 
 def gaze_pictures(policy: Policy, pairs: Yardstick) -> dict[str, Figure]:
-    """Pictures by name.
+    """Pictures by name; of an eye with a motor for each muscle also those of antagonists, and of the group's eye.
 
     Args:
         policy: that acts.
@@ -73,24 +75,45 @@ def gaze_pictures(policy: Policy, pairs: Yardstick) -> dict[str, Figure]:
     made, best = _pairs(policy, pairs)
     shown, oblique = _shown(task, policy), Saccades.between(task, policy, _from_ahead(task, _OBLIQUE_DEG))
     alone = [(part.trajectory, part.of_gaze) for part in oblique.components_alone(task, policy)]
-    every, few = _main_sequence(task, policy), _few(task, policy)
-    inside = made.trajectory.time <= made.of_gaze.settling_time_s[:, None]
-    inside[:, np.arange(inside.shape[1]) % _EVERY_SAMPLE > 0] = False
+    every, few = main_sequence_saccades(task, policy), _few(task, policy)
     gap = Figure(figsize=(7.5, 5), layout="constrained")
     _draw_gap(gap.subplots(), policy, pairs)
+    muscles, of_muscles = Muscles.of(task.plant.drawn()), {}
+    antagonists = None if muscles is None else muscles.pairs
+    if antagonists is not None:
+        between = few.trajectory[_BETWEEN], few.of_gaze[_BETWEEN]
+        correlation = of_any_saccades.antagonist_correlation(made.trajectory, made.of_gaze, antagonists)
+        error = rotations.angle_between_directions(rotations.gaze(made.of_gaze.final), rotations.gaze(made.target))
+        of_muscles = {
+            "muscles": of_any_saccades.antagonists_over_time(*between, antagonists, correlation),
+            "main_sequence_beside_group": of_any_saccades.main_sequence_beside_group(
+                (every.trajectory, every.of_gaze), (made.trajectory, made.of_gaze), error
+            ),
+        }
     return {
         "gaze_paths": of_any_saccades.gaze_paths(shown.trajectory, shown.of_gaze, shown.target),
         "components": of_any_saccades.component_velocities(oblique.trajectory, oblique.of_gaze, alone),
         "main_sequence": of_any_saccades.main_sequence(every.trajectory, every.of_gaze),
-        "listing_plane": of_any_saccades.listing_plane(
-            made.of_gaze.final,
-            made.trajectory.orientation[inside],
-            {"searched optimum": best.of_gaze.final, "least force at the target": pairs.target},
-        ),
+        "listing_plane": _listing_plane(made, best),
         "torsion": of_any_saccades.torsion_over_time(made.trajectory, made.of_gaze),
-        "motors": of_any_saccades.motors_over_time(few.trajectory, few.of_gaze),
+        "motors": of_any_saccades.motors_over_time(few.trajectory, few.of_gaze, antagonists),
+        **of_muscles,
         "reward_gap": titled(gap, "Reward gap", policy, task),
     }
+
+
+def _listing_plane(made: Saccades, best: Saccades) -> Figure:
+    """Of ends and samples on the way; beside those of the optimum, and of the least force, where ends are free."""
+    inside = made.trajectory.time <= made.of_gaze.settling_time_s[:, None]
+    inside[:, np.arange(inside.shape[1]) % _EVERY_SAMPLE > 0] = False
+    imposed = isinstance(made.task.actions, GeneratorActions)
+    compared = {"searched optimum": best.of_gaze.final, "least force at the target": made.target}
+    figure = of_any_saccades.listing_plane(
+        made.of_gaze.final, made.trajectory.orientation[inside], None if imposed else compared
+    )
+    if imposed:
+        figure.suptitle(f"{figure.get_suptitle()}\nimposed: all ends are where the statics hold the targets")
+    return figure
 
 
 def _pairs(policy: Policy, yardstick: Yardstick) -> tuple[Saccades, Saccades]:
@@ -114,7 +137,7 @@ def _shown(task: SaccadeTask, policy: Policy) -> Saccades:
     return Saccades.between(task, policy, angles)
 
 
-def _main_sequence(task: SaccadeTask, policy: Policy) -> Saccades:
+def main_sequence_saccades(task: SaccadeTask, policy: Policy) -> Saccades:
     """Of every size into all directions, around straight ahead."""
     limit = 2 * task.targets.limit_deg
     sizes = np.array([size for size in _MAIN_SEQUENCE_DEG if size <= limit])
@@ -147,8 +170,7 @@ def _draw_components(axes: "Axes", made: Saccades) -> None:
 
 def _directions(shift: Array) -> "list[tuple[str, dict[str, Any], NDArray[np.bool_]]]":
     """Name, style and which of saccades (n, 2), left and up, are horizontal, vertical, or neither."""
-    angle = np.rad2deg(np.arctan2(np.abs(shift[:, 1]), np.abs(shift[:, 0])))
-    horizontal, vertical = angle <= _AXIAL_DEG, angle >= 90 - _AXIAL_DEG
+    horizontal, vertical = axial(shift)
     return [
         ("horizontal", {"color": HORIZONTAL, "marker": "o"}, horizontal),
         ("vertical", {"color": VERTICAL, "marker": "^"}, vertical),

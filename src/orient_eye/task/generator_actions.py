@@ -1,0 +1,209 @@
+"""Actions of an eye that has more motors than axes: pulse-step generators that its motors share, D from the statics.
+
+    actions = GeneratorActions(plant, driven=("IR", "MR", "SR", "LR", "IO", "SO"), pulse="smooth")
+    actions.names                                    # ("B_sideways", "k0_sideways", "B_updown", "k0_updown")
+    actions.plain                                    # the same by B and k0 themselves
+
+Each motor goes to where the eye is held in the target's direction (`orient_eye.plants.fixation`): the end point needs
+no learning, and Listing's law at rest is that of the statics, imposed. Its way there has two parts: what carries the
+gaze sideways, and what carries it up or down. Each part has a generator of its own, as in the brainstem (horizontal:
+the paramedian pontine reticular formation; vertical and torsional: the rostral interstitial nucleus of the medial
+longitudinal fasciculus). So muscles that hold the eye's yaw while others turn it up or down do it in time with them.
+With one generator for each group of motors they cannot, and some saccades up or down take five times as long.
+
+A policy's numbers are ratios to usual ones, as in `orient_eye.task.residual_actions`; those of the plain actions are B
+and k0.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orient_eye import listing, rotations
+from orient_eye.cached import cached_property
+from orient_eye.commands import Command
+from orient_eye.commands.generators import Generators
+from orient_eye.commands.pulses import PULSES
+from orient_eye.errors import InputError
+from orient_eye.motor import rests
+from orient_eye.plants import Plant, PulseRates
+from orient_eye.plants.fixation import Fixations, Rule
+from orient_eye.state import State
+from orient_eye.task.actions import ActionSpace, Number, PulseStepActions
+
+Array = NDArray[np.float64]
+Kind = Literal["directions", "axes", "pairs"]
+"""What generators are for: a direction of gaze, or a group of motors, those that turn the eye sideways and the others,
+or each pair of antagonists."""
+RATES = PulseRates((15.0, 220.0), (2.0, 50.0))
+"""Hold the best pulse-steps of the six-motor eye."""
+_SIDEWAYS = 2  # among the axes of a turn: about z
+_DIRECTIONS = ("sideways", "updown")
+_LARGEST_DEG, _SMALLEST_DEG = 90.0, 1.0
+
+
+class GeneratorActions(ActionSpace):
+    """B and k0 of each generator.
+
+    Args:
+        plant: whose motors are commanded.
+        driven: all of them.
+        pulse: as of `PulseStepActions`.
+        C: the same, but for a varying one: a motor follows several generators, whose C cannot keep its speed limit.
+        speed_limit: the same, without effect here.
+        rates: as of `PulseStepActions`.
+        rule: with which torsion the motors hold a target (`orient_eye.plants.fixation`); None for the least force.
+        generators: what they are for.
+
+    Raises:
+        InputError: as `PulseStepActions`, an unknown kind of generators, a varying C, or motors that do not turn the
+            eye in all directions.
+    """
+
+    kind = "generators"
+
+    def __init__(
+        self,
+        plant: Plant,
+        driven: Sequence[str],
+        pulse: str = "1",
+        C: float | str | None = None,
+        speed_limit: float | None = None,
+        rates: PulseRates | Mapping[str, Sequence[float]] | None = None,
+        rule: Rule | None = None,
+        generators: Kind = "directions",
+    ) -> None:
+        if C == "varying":
+            raise InputError(
+                "a motor follows several generators here, so no onset rate C brings it to its speed limit; choose a "
+                "case with a fixed C, or without one"
+            )
+        self.each = PulseStepActions(plant, driven, pulse, C, speed_limit, rates)
+        self.rule: Rule | None = None if rule == "least force" else rule  # one law, one identity
+        if generators not in get_args(Kind):
+            raise InputError(f"generators are for {', '.join(get_args(Kind))}, got {generators!r}")
+        self.generators, self.fixations = generators, Fixations.of(plant, self.rule)
+        self.members = _members(plant, self.each.index, generators)
+        self.numbers = self._numbers()
+
+    def _numbers(self) -> tuple[Number, ...]:
+        bounds = {number.symbol: number for number in self.each.numbers}
+        groups = ("_".join(self.each.plant.motors[i].name for i in some) for some in self.members)
+        return tuple(
+            Number(symbol, "1/s", name, bounds[symbol].low, bounds[symbol].high, True, fine, symbol == "k0")
+            for name in (_DIRECTIONS if self.generators == "directions" else groups)
+            for symbol, fine in (("B", 0.05), ("k0", 0.03))
+        )
+
+    def identity(self) -> dict[str, Any]:
+        """Kind, what generators are for, rule of torsion, motors, pulse, C, and bounds."""
+        each = {key: value for key, value in self.each.identity().items() if key != "speed_limit"}
+        bounds = {"low": self.low.tolist(), "high": self.high.tolist()}
+        return {**each, "actions": self.kind, "generators": self.generators, "rule": self.rule, **bounds}
+
+    def ways(self, start: State, target: Array) -> Array:
+        """By how much each generator takes each motor, (saccades, generators, motors).
+
+        Of directions: the way from start to target along two sides of a rectangle of yaw and pitch, the mean of both
+        orders. What is left, of a start that has another torsion, goes with up and down.
+        """
+        ends = rotations.gaze(start.orientation), rotations.gaze(target)
+        to = self.fixations.motor(ends[1])
+        whole = to - start.motor
+        if self.generators != "directions":
+            masks = np.zeros((len(self.members), whole.shape[1]))
+            for mask, some in zip(masks, self.members, strict=True):
+                mask[some] = 1
+            return np.asarray(whole[:, None] * masks)
+        (yaw, pitch), (yaw_to, pitch_to) = (rotations.to_euler(q)[:2] for q in (start.orientation, target))
+        from_, first, then = (
+            self.fixations.motor(listing.directions(*at)) for at in ((yaw, pitch), (yaw_to, pitch), (yaw, pitch_to))
+        )
+        sideways = (first - from_ + to - then) / 2
+        return np.stack([sideways, whole - sideways], axis=1)
+
+    def command(self, start: State, target: Array, action: Array) -> Command:
+        """The motors' command."""
+        told = np.asarray(action, float).reshape(len(start), -1, 2)
+        ways = self.ways(start, target)
+        return Generators(start.motor, ways, told[..., 0], told[..., 1], self.each.pulse, self.each.C)
+
+    def likely(self, target: Array) -> Array:
+        """Nothing is known."""
+        return np.full((len(target), len(self.numbers)), np.nan)
+
+
+USUAL_B, FALLS = 113.0, 0.52
+"""B = 113 n A^-0.52 [1/s] of a saccade of A deg and a pulse of n poles: as the searched optima of the six-motor eye
+fall."""
+USUAL_K0 = 0.9
+"""k0 over the pole by which the eye follows the motors: the same optima."""
+_B, _K0 = 0.5, 0.45  # of the natural logarithm, to either side
+
+
+class GeneratorRatios(GeneratorActions):
+    """Ratios of the numbers of `GeneratorActions` to usual ones: a B that falls with the amplitude, and a k0.
+
+    The usual k0 is a little below the mean pole by which the eye follows the motors at rest.
+    """
+
+    kind = "generator-ratios"
+
+    def _numbers(self) -> tuple[Number, ...]:
+        return tuple(
+            replace(number, symbol=f"{number.symbol}_ratio", unit="", low=np.exp(-far), high=np.exp(far), fine=0.1)
+            for number in super()._numbers()
+            for far in (_B if number.symbol == "B" else _K0,)
+        )
+
+    @cached_property
+    def plain(self) -> GeneratorActions:
+        """See `orient_eye.task.actions.ActionSpace`."""
+        each = self.each
+        return GeneratorActions(
+            each.plant, each.driven, each.pulse, each.C, None, each.rates, self.rule, self.generators
+        )
+
+    @cached_property
+    def _usual(self) -> tuple[float, Array]:
+        """B of a saccade of 1 deg, and k0 of each generator, (generators,)."""
+        known = np.log(self.each.plant.motor_rates())
+        k0 = [USUAL_K0 * float(np.exp(known[some].mean())) for some in self.members]
+        one = np.ones((1, 1))
+        return USUAL_B * len(PULSES[self.each.pulse].poles(one, one)), np.array([float(f"{x:.4g}") for x in k0])
+
+    def as_plain(self, start: State, target: Array, action: Array) -> Array:
+        """See `orient_eye.task.actions.ActionSpace`; inside the bounds of B and k0."""
+        ratio = np.asarray(action, float).reshape(len(start), -1, 2)
+        ends = rotations.gaze(start.orientation), rotations.gaze(target)
+        size = np.clip(rotations.angle_between_directions(*ends), _SMALLEST_DEG, _LARGEST_DEG)
+        B, k0 = self._usual
+        plain = np.stack([B * size[:, None] ** -FALLS * ratio[..., 0], k0 * ratio[..., 1]], axis=-1)
+        return np.clip(plain.reshape(len(start), -1), self.plain.low, self.plain.high)
+
+    def command(self, start: State, target: Array, action: Array) -> Command:
+        """The motors' command."""
+        return self.plain.command(start, target, self.as_plain(start, target, action))
+
+
+def _members(plant: Plant, index: Sequence[int], generators: Kind) -> list[list[int]]:
+    """Motors of each group; of directions those whose poles are the generators'."""
+    count = len(plant.motors)
+    at = plant.rest(rests(plant.motors) + np.eye(count + 1, count, -1))
+    turn = (rotations.rotation(at[1:]) * rotations.rotation(at[0]).inv()).as_rotvec()
+    if generators == "pairs":
+        unit = turn / np.linalg.norm(turn, axis=1, keepdims=True)
+        other = (unit @ unit.T).argmin(axis=1)
+        if (other[other] != np.arange(count)).any():
+            raise InputError(
+                f"the motors of plant {plant.name!r} are not pairs of antagonists; take generators for axes"
+            )
+        return [[i, j] for i, j in enumerate(other.tolist()) if i < j]
+    sideways = np.abs(turn).argmax(axis=1) == _SIDEWAYS
+    kinds = [[i for i in index if sideways[i] == kind] for kind in (True, False)]
+    if not all(kinds):
+        raise InputError(f"no motors of plant {plant.name!r} turn the eye sideways, or no others; take other actions")
+    return kinds

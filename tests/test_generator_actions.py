@@ -1,0 +1,215 @@
+"""Generators that motors share, and actions of an eye with more motors than axes: meaning, and where they end."""
+
+import gymnasium
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import quad
+
+from orient_eye import listing, rotations
+from orient_eye.commands.generators import Generators
+from orient_eye.commands.pulse_step import PulseStep
+from orient_eye.errors import InputError
+from orient_eye.plants import make_plant
+from orient_eye.plants.tavares import TavaresPlant
+from orient_eye.task.actions import PulseStepActions, restore_actions
+from orient_eye.task.gaze_targets import GazeTargets
+from orient_eye.task.generator_actions import GeneratorActions, GeneratorRatios
+from orient_eye.task.saccade import SaccadeTask
+from orient_eye.task.targets import make_targets, saccades
+
+Array = NDArray[np.float64]
+SIX = ("IR", "MR", "SR", "LR", "IO", "SO")
+LAW = settings(deadline=None, max_examples=25, derandomize=True)
+angle = st.floats(-17.0, 17.0)
+rate = st.floats(5.0, 150.0)
+
+
+@pytest.fixture(scope="module")
+def plant() -> TavaresPlant:
+    return TavaresPlant("six")
+
+
+@pytest.fixture(scope="module")
+def task(plant: TavaresPlant) -> SaccadeTask:
+    return SaccadeTask.of_case(plant, "smooth")
+
+
+def drawn(pulse: str, B: tuple[float, float], k0: tuple[float, float]) -> Generators:
+    way = np.array([[[3.0, -2.0, 0.0], [1.0, 4.0, -5.0]]])
+    C = 20.0 if pulse in ("2", "3") else None
+    return Generators(np.array([[10.0, 20.0, 30.0]]), way, np.array([B]), np.array([k0]), pulse, C)
+
+
+# --- the command ----------------------------------------------------------------------------------
+
+
+@LAW
+@given(pulse=st.sampled_from(["1", "2", "3", "smooth"]), B=st.tuples(rate, rate), k0=st.tuples(rate, rate))
+def test_energy_is_that_of_the_speeds(pulse: str, B: tuple[float, float], k0: tuple[float, float]) -> None:
+    command = drawn(pulse, B, k0)
+    last = 30 / min(B)
+
+    def power(t: float) -> float:
+        return float((command.rate([t])[0, 0] ** 2).sum())
+
+    expected = quad(power, 0, last, limit=400, epsabs=0, epsrel=1e-9)[0]
+    assert command.energy()[0] == pytest.approx(expected, rel=1e-6)
+
+
+@LAW
+@given(pulse=st.sampled_from(["1", "2", "3", "smooth"]), B=st.tuples(rate, rate), k0=st.tuples(rate, rate))
+def test_a_generator_for_each_motor_is_the_pulse_step_of_the_thesis(
+    pulse: str, B: tuple[float, float], k0: tuple[float, float]
+) -> None:
+    C = 20.0 if pulse in ("2", "3") else None
+    F, D = np.array([[1.0, -2.0]]), np.array([[8.0, 3.0]])
+    shared = Generators(F, np.diagflat(D - F)[None], np.array([B]), np.array([k0]), pulse, C)
+    alone = PulseStep(F, np.array([B]), D, np.array([k0]), pulse, C)
+    np.testing.assert_allclose(shared.sample(0.002, 200), alone.sample(0.002, 200), rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(shared.energy(), alone.energy(), rtol=1e-7)
+    np.testing.assert_allclose(shared.final, alone.final)
+
+
+def test_some_of_the_saccades_are_the_same() -> None:
+    one = drawn("smooth", (30.0, 60.0), (5.0, 20.0))
+    two = Generators(*(np.concatenate([a, 2 * a]) for a in (one.F, one.way, one.B, one.k0)), "smooth")
+    np.testing.assert_array_equal(two[np.array([0])].sample(0.001, 50), one.sample(0.001, 50))
+    np.testing.assert_array_equal(two[np.array([False, True])].final, 2 * one.final)
+
+
+def test_numbers_that_are_none_fail_their_saccade_only() -> None:
+    one = drawn("smooth", (30.0, 60.0), (5.0, 20.0))
+    B, way = np.repeat(one.B, 3, axis=0), np.repeat(one.way, 3, axis=0)
+    B[1, 0], way[2, 1, 2] = np.nan, np.inf
+    command = Generators(np.repeat(one.F, 3, axis=0), way, B, np.repeat(one.k0, 3, axis=0), "smooth")
+    told = command.sample(0.001, 20)
+    assert np.isfinite(told).all(axis=(1, 2)).tolist() == [True, False, False]
+    np.testing.assert_array_equal(told[0], one.sample(0.001, 20)[0])
+    with pytest.raises(InputError, match=r"have the shapes .* got \(1, 3\), \(1, 2, 3\), \(1, 3\)"):
+        Generators(one.F, one.way, np.ones((1, 3)), one.k0)
+    with pytest.raises(InputError, match="k0 must be positive"):
+        Generators(one.F, one.way, one.B, -one.k0).sample(0.001, 2)
+
+
+# --- the actions ----------------------------------------------------------------------------------
+
+
+def test_an_eye_with_six_motors_looks_in_all_directions(task: SaccadeTask) -> None:
+    assert isinstance(task.targets, GazeTargets)
+    assert (task.targets.limit_deg, task.targets.torsion_deg) == (25.0, 0.6)
+    assert isinstance(task.actions, GeneratorRatios)
+    assert task.actions.names == ("B_ratio_sideways", "k0_ratio_sideways", "B_ratio_updown", "k0_ratio_updown")
+    assert task.plain.actions.names == ("B_sideways", "k0_sideways", "B_updown", "k0_updown")
+
+
+@pytest.mark.parametrize("name", ["horizontal", "vertical", "torsional"])
+def test_it_does_not_turn_about_one_axis_by_some_motors(plant: TavaresPlant, name: str) -> None:
+    with pytest.raises(InputError, match=r"6 motors of plant 'tavares' turn the eye about all axes .* targets gaze"):
+        make_targets(name, plant)
+
+
+@LAW
+@given(start=st.tuples(angle, angle), target=st.tuples(angle, angle), seed=st.integers(0, 2**20))
+def test_whatever_the_numbers_are_the_eye_ends_on_the_target(
+    task: SaccadeTask, plant: TavaresPlant, start: tuple[float, float], target: tuple[float, float], seed: int
+) -> None:
+    begin, wanted = saccades(task.targets, [start], [target])
+    action = task.actions.from_unit(np.random.default_rng(seed).uniform(-1, 1, (1, 4)))
+    command = task.actions.command(begin, wanted, action)
+    rest = plant.rest(command.final)
+    assert rotations.angle_between_directions(rotations.gaze(rest), rotations.gaze(wanted)).max() < 0.001
+    assert plant.cables.state(rest, command.final).good.all()
+    assert listing.torsion(rest) == pytest.approx(listing.torsion(wanted), abs=0.001)
+
+
+def test_each_generator_carries_the_gaze_one_way(task: SaccadeTask, plant: TavaresPlant) -> None:
+    """The sideways part alone turns the eye by the saccade's yaw, the other by its pitch."""
+    begin, wanted = saccades(task.targets, [[-8.0, 6.0], [10.0, -4.0]], [[9.0, -7.0], [10.0, 12.0]])
+    assert isinstance(task.plain.actions, GeneratorActions)
+    ways = task.plain.actions.ways(begin, wanted)
+    np.testing.assert_allclose(
+        begin.motor + ways.sum(axis=1), task.plain.actions.fixations.motor(rotations.gaze(wanted))
+    )
+    for which, (yaw, pitch) in enumerate([((17.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (-13.0, 16.0))]):
+        ends = rotations.to_euler(plant.rest(begin.motor + ways[:, which]))
+        begins = rotations.to_euler(begin.orientation)
+        np.testing.assert_allclose(ends[0] - begins[0], yaw if which == 0 else 0.0, atol=0.6)
+        np.testing.assert_allclose(ends[1] - begins[1], pitch if which == 0 else (-13.0, 16.0), atol=0.6)
+
+
+def test_muscles_that_hold_the_yaw_keep_time_with_those_that_turn_the_eye_up(task: SaccadeTask) -> None:
+    """A saccade up, in which the horizontal recti hardly move: by groups of motors it drifts to the side meanwhile."""
+    begin, wanted = saccades(task.targets, [[13.8, 2.0]], [[12.2, -19.3]])
+    took = {}
+    for kind in ("directions", "axes"):
+        actions = GeneratorActions(task.plant, SIX, "smooth", rates=task.targets.pulse_rates, generators=kind)  # type: ignore[arg-type]
+        B, k0 = np.meshgrid(np.geomspace(40, 90, 5), np.geomspace(2.2, 9, 12))
+        tried = np.stack([B.ravel(), k0.ravel(), np.full(60, 81.0), np.full(60, 18.5)], axis=1)
+        where = np.zeros(60, int)
+        plain = SaccadeTask(task.plant, actions, task.targets, task.weights, "gaze", task.band, task.horizon_s)
+        found = plain.perform(begin[where], tried, wanted[where]).measures
+        took[kind] = np.nanmin(np.where(found.settled, found.settling_time_s, np.inf))
+    assert took["directions"] < 0.13
+    assert took["axes"] > 0.4
+
+
+def test_ratios_are_of_usual_numbers_and_stay_in_bounds(task: SaccadeTask) -> None:
+    random = np.random.default_rng(0)
+    begin, wanted = task.targets.draw(200, random)
+    plain = task.plain.actions
+    told = task.actions.as_plain(begin, wanted, task.actions.from_unit(random.uniform(-1, 1, (200, 4))))
+    assert (told >= plain.low).all()
+    assert (told <= plain.high).all()
+    usual = task.actions.as_plain(begin, wanted, np.ones((200, 4)))
+    size = rotations.angle_between_directions(rotations.gaze(begin.orientation), rotations.gaze(wanted))
+    assert (np.diff(usual[np.argsort(size), 0]) <= 0).all()  # B falls with the amplitude
+    assert np.ptp(usual[:, 1::2], axis=0).max() == 0  # k0 does not
+
+
+def test_generators_for_groups_of_motors(plant: TavaresPlant) -> None:
+    pairs = GeneratorActions(plant, SIX, "smooth", generators="pairs")
+    assert pairs.names[::2] == ("B_IR_SR", "B_MR_LR", "B_IO_SO")
+    axes = GeneratorActions(plant, SIX, "smooth", generators="axes")
+    assert axes.names == ("B_MR_LR", "k0_MR_LR", "B_IR_SR_IO_SO", "k0_IR_SR_IO_SO")
+    assert restore_actions(axes.identity(), plant).identity() == axes.identity()
+    with pytest.raises(InputError, match="generators are for directions, axes, pairs, got 'muscles'"):
+        GeneratorActions(plant, SIX, generators="muscles")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="no onset rate C brings it to its speed limit"):
+        GeneratorActions(plant, SIX, "2", "varying")
+    three = make_plant("tavares")
+    with pytest.raises(InputError, match="not pairs of antagonists; take generators for axes"):
+        GeneratorActions(three, ("motor1", "motor2", "motor3"), generators="pairs")
+
+
+def test_a_generator_for_each_pair_tells_its_motors_the_same(plant: TavaresPlant, task: SaccadeTask) -> None:
+    begin, wanted = saccades(task.targets, [[0.0, 0.0]], [[12.0, -9.0]])
+    pairs = GeneratorActions(plant, SIX, "smooth", rates=task.targets.pulse_rates, generators="pairs")
+    each = PulseStepActions(plant, SIX, "smooth", rates=task.targets.pulse_rates)
+    D = pairs.fixations.motor(rotations.gaze(wanted))[0]
+    B, k0 = np.array([30.0, 60, 30, 60, 90, 90]), np.array([10.0, 5, 10, 5, 20, 20])
+    np.testing.assert_allclose(
+        pairs.command(begin, wanted, np.array([[30.0, 10, 60, 5, 90, 20]])).sample(0.001, 400),
+        each.command(begin, wanted, np.stack([B, D, k0], axis=1).reshape(1, -1)).sample(0.001, 400),
+        atol=1e-9,
+    )
+
+
+def test_restored_tasks_are_the_same(task: SaccadeTask) -> None:
+    again = SaccadeTask.restore(task.identity())
+    assert again.identity() == task.identity()
+    assert SaccadeTask.restore(task.identity(), make_plant("mujoco", eye="six")).actions.names == task.actions.names
+
+
+def test_the_environment_has_four_numbers() -> None:
+    env = gymnasium.make(
+        "OrientEye/Saccade-v0", plant="tavares", plant_options={"eye": "six"}, targets="gaze", case="smooth"
+    )
+    env.reset(seed=0)
+    assert env.action_space.shape == (4,)
+    _, reward, terminated, _, _ = env.step(np.zeros(4, np.float32))
+    assert terminated
+    assert float(reward) < 0
+    env.close()
