@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,14 +15,17 @@ from scipy.spatial.transform import Rotation
 
 from orient_eye.cli import main
 from orient_eye.errors import InputError
+from orient_eye.eyes.model import load_spec
 from orient_eye.figures import muscles
 from orient_eye.listing import directions, fit_plane, torsion, with_torsion
-from orient_eye.motor import rests
+from orient_eye.motor import names, rests
 from orient_eye.movement.oblique import toward
 from orient_eye.plants import Plant, make_plant
 from orient_eye.plants.cables import CRITERIA, Cables
 from orient_eye.plants.fixation import Fixations
-from orient_eye.rotations import gaze
+from orient_eye.plants.tavares import TavaresPlant
+from orient_eye.resources import data_folder
+from orient_eye.rotations import from_euler, gaze
 from orient_eye.statics import Ends, Postures, Softening, cables_of, cone
 
 Array = NDArray[np.float64]
@@ -362,3 +366,33 @@ def test_the_pictures_show_left_on_the_left() -> None:
     assert any("2.71" in text.get_text() for text in softer.axes[0].texts)
     drawn = {line.get_label(): line for line in meridians.axes[1].lines}
     np.testing.assert_array_equal(drawn["MR"].get_ydata(), along[0][1].motor[:, 1])
+
+
+def test_four_arms_hold_the_eye_near_their_rest(tmp_path: Path) -> None:
+    """More arms than axes, which pull on curved lines: no cables, but the eye is held, with little change."""
+    spec = load_spec("thesis")
+    spec.meshdir = str(data_folder("eye_mjcf") / "meshes")
+    body = spec.worldbody.add_body(name="arm4", pos=[-0.323, 0, 0.03])
+    body.add_joint(name="motor4", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1], armature=1)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0, 0], mass=0.05)
+    for side, y in (("right", -1.0), ("left", 1.0)):
+        body.add_site(name=f"arm_motor4_{side}", pos=[0, 0.14 * y, 0])
+        spec.body("eye").add_site(name=f"eye_motor4_{side}", pos=[0.007, 0.07 * y, 0.027])
+        tendon = spec.add_tendon(name=f"motor4_{side}", stiffness=25, springlength=[0, 0.24])
+        tendon.wrap_site(f"arm_motor4_{side}")
+        tendon.wrap_site(f"eye_motor4_{side}")
+        spec.add_sensor(
+            name=f"length_motor4_{side}", type=mujoco.mjtSensor.mjSENS_TENDONPOS, objtype=mujoco.mjtObj.mjOBJ_TENDON,
+            objname=f"motor4_{side}",
+        )  # fmt: skip
+    servo = spec.add_actuator(name="motor4", trntype=mujoco.mjtTrn.mjTRN_JOINT, target="motor4", ctrlrange=[-1.4, 1.4])
+    servo.set_to_position(kp=1e6, kv=1e3)
+    file = tmp_path / "four.xml"
+    file.write_text(spec.to_xml())
+    plant = TavaresPlant(str(file))
+    wanted = from_euler([12.0, -8.0], [5.0, 10.0], [1.0, 0.0])
+    motor = plant.hold(wanted, names(plant.motors))
+    assert np.abs(plant.torque(wanted, motor)).max() < 1e-9
+    assert np.abs(motor).max() < 40
+    alone = plant.hold(wanted, names(plant.motors)[:3])
+    assert (np.linalg.norm(motor, axis=1) < np.linalg.norm(alone, axis=1)).all()

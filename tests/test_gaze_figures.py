@@ -16,6 +16,7 @@ from orient_eye.figures import gaze as pictures
 from orient_eye.figures.trajectory import draw_trajectory
 from orient_eye.listing import directions, ficks_torsion, with_torsion
 from orient_eye.motor import Motor
+from orient_eye.movement.antagonists import antagonist_correlation
 from orient_eye.movement.main_sequence import fit_peak_velocity
 from orient_eye.movement.measures import Measures, measure
 from orient_eye.movement.trajectory import Trajectory
@@ -186,7 +187,7 @@ def muscles() -> tuple[Trajectory, Measures]:
 
 def test_agonist_and_antagonist_and_what_parts_them() -> None:
     trajectory, measures = muscles()
-    found = pictures.antagonist_correlation(trajectory, measures, PAIRS)
+    found = antagonist_correlation(trajectory, measures, PAIRS)
     np.testing.assert_allclose(found[:2], [-1, 1])
     assert np.isnan(found[2])
     figure = pictures.antagonists_over_time(trajectory, measures, PAIRS, [*found[:2], 0.0])

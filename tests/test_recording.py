@@ -17,11 +17,11 @@ from orient_eye import rotations
 from orient_eye.cli.view import View
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import Tendons, build_model
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.motor import Motor
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.plants.mujoco import MujocoPlant
 from orient_eye.recording import curves, record, record_sequence, viewer
-from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.scene import SLACK_COLOUR, TENSION_COLOURS, tension_colours
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.figures import save
 from orient_eye.learning import figures
 from orient_eye.learning.directions import in_all_directions
@@ -19,6 +20,7 @@ from orient_eye.learning.evaluation import Yardstick, amplitude_table, gap_summa
 from orient_eye.learning.figures.saccades import Saccades
 from orient_eye.learning.gaze_numbers import gaze_numbers, stretching
 from orient_eye.learning.policy import Policy
+from orient_eye.movement.antagonists import antagonist_correlation
 from orient_eye.recording import record
 from orient_eye.task.table import outcome_columns, rows_of, with_peaks
 from orient_eye.words import plant_in_words
@@ -65,8 +67,18 @@ def measure_policy(policy: Policy, pairs: Yardstick, table: Yardstick) -> tuple[
 def _of_gaze(policy: Policy, pairs: Yardstick, action: Array) -> dict[str, float | None]:
     """Numbers of the gaze and of torsion under the policy's plain actions (saccades, numbers), and under the best."""
     made, best = (Saccades(pairs.task.plain, pairs.start, pairs.target, a) for a in (action, pairs.optimum.action))
-    ours = {**gaze_numbers(made), **stretching(pairs.task, policy, made)}
+    ours = {**gaze_numbers(made), **stretching(pairs.task, policy, made), **_of_antagonists(made)}
     return ours | {f"{name}_best": value for name, value in gaze_numbers(best).items()}
+
+
+def _of_antagonists(made: Saccades) -> dict[str, float]:
+    """How the motors of antagonists correlate, by their names; none where an eye has no such muscles."""
+    muscles = Muscles.of(made.task.plant.drawn())
+    if muscles is None:
+        return {}
+    found = antagonist_correlation(made.trajectory, made.of_gaze, muscles.pairs)
+    named = ("_".join(muscles.names[i] for i in pair) for pair in muscles.pairs.tolist())
+    return {f"antagonist_correlation_{name}": value for name, value in zip(named, found, strict=True)}
 
 
 def draw_policy_figures(policy: Policy, pairs: Yardstick, table: Yardstick, folder: Path) -> list[str]:

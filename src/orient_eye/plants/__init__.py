@@ -142,6 +142,13 @@ class Plant(Protocol):
         """
         ...
 
+    def turning_rates(self, orientation: Array, motor: Array) -> Array | None:
+        """How fast a resting eye without inertia goes back to rest about x, y and z [1/s], (saccades, 3).
+
+        None for a plant whose elastics are not known; arguments as `force`'s.
+        """
+        ...
+
     def motor_rates(self) -> Array:
         """Size of the pole [1/s] by which the eye follows each motor above all, at rest, (motors,); NaN if unknown."""
         ...

@@ -16,9 +16,9 @@ from itertools import chain, combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from orient_eye.cached import cached_property
 from orient_eye.checks import real
 from orient_eye.errors import InputError
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.motor import Motor, names, ranges, rests
 from orient_eye.plants.equilibrium import Torque, least_stiffness, stiffness
 from orient_eye.registry import Registry
@@ -147,18 +147,21 @@ class Cables:
         motors: of the eye.
         torque: on an eye at rest, (n, 4), (n, motors) to [N m] (n, 3).
         tension: the same to [N] (n, tendons).
+        muscles: its cables, where they are pairs of antagonists.
     """
 
     plant: str
     motors: tuple[Motor, ...]
     torque: Torque
     tension: Torque
+    muscles: Muscles | None
 
     def lines(self, orientation: Array) -> Lines:
         """Of eyes in orientations (n, 4)."""
         n, m = len(orientation), len(self.motors)
         rest = rests(self.motors)
-        far = _TAUT * (ranges(self.motors)[:, 1] - rest)
+        high = ranges(self.motors)[:, 1]
+        far = _TAUT * np.where(np.isfinite(high), high - rest, 360.0)
         taut = rest + far + far / 2 * np.eye(m + 1, m, -1)
         flat, motor = np.repeat(orientation, m + 1, axis=0), np.tile(taut, (n, 1))
         torque = self.torque(flat, motor).reshape(n, m + 1, 3)
@@ -168,27 +171,19 @@ class Cables:
         pull = (tension[:, 1:] - tension[:, :1]).mean(axis=0).T / (back / 2) if n else np.zeros((tension.shape[2], m))
         return Lines(tension[:, 0] - pull @ back, pull, torque[:, 0] - moment @ back, moment)
 
-    @cached_property
+    @property
     def pairs(self) -> NDArray[np.intp]:
-        """Motors that turn the eye against each other, straight ahead, (pairs, 2), in the motors' order.
-
-        Each motor's antagonist is the one that turns it the most nearly the other way.
+        """Antagonists (`orient_eye.eyes.muscles`), (pairs, 2).
 
         Raises:
-            InputError: not all motors are one of two, or they do not wind up a cable each, in their order.
+            InputError: the motors are not pairs of antagonists.
         """
-        lines = self.lines(np.array([[1.0, 0.0, 0.0, 0.0]]))
-        turn = lines.moment[0].T
-        turn = turn / np.linalg.norm(turn, axis=1, keepdims=True)
-        other = (turn @ turn.T).argmin(axis=1)
-        pull = lines.pull
-        own = pull.shape == (len(turn),) * 2 and np.allclose(pull, np.diag(np.diag(pull)), atol=1e-9)
-        if not own or (other[other] != np.arange(len(turn))).any():
+        if self.muscles is None:
             raise InputError(
                 f"the motors of plant {self.plant!r} ({', '.join(names(self.motors))}) are not pairs of antagonists "
                 "with a cable each; choose the criterion least-change"
             )
-        return np.array([(i, j) for i, j in enumerate(other.tolist()) if i < j])
+        return self.muscles.pairs
 
     @property
     def pretension(self) -> float:

@@ -12,6 +12,7 @@ from orient_eye.cached import cached_property
 from orient_eye.checks import whole
 from orient_eye.constants import HORIZON_S
 from orient_eye.eyes import model as eyes
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.motor import AXES, check_driven, ranges, redundant, rests
 from orient_eye.plants import PulseRates, equilibrium
 from orient_eye.plants.cables import Cables
@@ -113,9 +114,14 @@ class ElasticPlant(SimulatedPlant):
         return redundant(self.motors)
 
     @cached_property
+    def _wound(self) -> bool:
+        """Whether spindles alone pull, so that tension and torque follow the motors on straight lines."""
+        return bool((eyes.Tendons.of(self.model).motor >= 0).all())
+
+    @cached_property
     def cables(self) -> Cables:
         """How motors that are more than the axes share the work."""
-        return Cables(self.name, self.motors, self.torque, self.tension)
+        return Cables(self.name, self.motors, self.torque, self.tension, Muscles.of(self.model))
 
     def identity(self) -> dict[str, Any]:
         """Name, options and hash of the compiled model."""
@@ -128,6 +134,12 @@ class ElasticPlant(SimulatedPlant):
         slow = np.sort(np.abs(poles[~swings]))
         sizes = [*slow[: (len(slow) + 1) // 2], *np.abs(poles[swings & (poles.imag > 0)])]
         return sorted(float(f"{size:.4g}") for size in sizes)  # the same bounds of actions on any machine
+
+    def turning_rates(self, orientation: Array, motor: Array) -> Array | None:
+        """See `orient_eye.plants.Plant`: stiffness over friction."""
+        friction = float(self.model.dof_damping[self.model.joint("eye").dofadr[0]])
+        stiffness = equilibrium.stiffness(self.torque, orientation, motor)
+        return np.asarray(np.diagonal(stiffness, axis1=1, axis2=2) / friction)
 
     def motor_rates(self) -> Array:
         """See `orient_eye.plants.Plant`."""
@@ -177,7 +189,7 @@ class ElasticPlant(SimulatedPlant):
         """See `orient_eye.plants.Plant`."""
         index = check_driven(self.motors, driven, self.name)
         working = np.array([motor.working for motor in self.motors])
-        if len(index) > AXES:
+        if len(index) > AXES and self._wound:
             return self.cables.held(orientation, index, working)
         motor, held = equilibrium.held_motor(self.torque, orientation, rests(self.motors), index, working)
         return np.where(held[:, None], motor, np.nan)
@@ -185,6 +197,6 @@ class ElasticPlant(SimulatedPlant):
     def hold(self, orientation: Array, driven: tuple[str, ...]) -> Array:
         """See `orient_eye.plants.Plant`."""
         index = check_driven(self.motors, driven, self.name)
-        if len(index) > AXES:
+        if len(index) > AXES and self._wound:
             return self.cables.hold(orientation, index, ranges(self.motors))
         return equilibrium.rest_motor(self.torque, orientation, rests(self.motors), index, ranges(self.motors))

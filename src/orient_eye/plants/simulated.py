@@ -186,6 +186,10 @@ class SimulatedPlant(ABC):
         """None: of this plant no elastics are known."""
         return None
 
+    def turning_rates(self, orientation: Array, motor: Array) -> Array | None:
+        """None: of this plant no elastics are known."""
+        return None
+
     def motor_rates(self) -> Array:
         """NaN: nothing is known of them."""
         return np.full(len(self.motors), np.nan)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orient_eye import listing, rotations
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording.directions import Graticule, net, protractor
-from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.scene import REFERENCE_COLOUR, TIMELINE, Colour, slug
 
 if TYPE_CHECKING:

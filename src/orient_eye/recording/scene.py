@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orient_eye import rotations
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.recording.directions import Graticule, ring
 from orient_eye.recording.geometry import geometry
-from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.poses import Poses
 
 if TYPE_CHECKING:

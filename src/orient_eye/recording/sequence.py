@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from orient_eye import rotations
 from orient_eye.errors import InputError
 from orient_eye.eyes.model import ball
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.movement.trajectory import Trajectory
 from orient_eye.recording import titles as naming
 from orient_eye.recording.curves import Curves
 from orient_eye.recording.layout import SaccadeTab, saccade_colours, sequence_blueprint
-from orient_eye.recording.muscles import Muscles
 from orient_eye.recording.poses import pose, tendon_names
 from orient_eye.recording.rotation_vectors import RotationVectors
 from orient_eye.recording.scene import Scene

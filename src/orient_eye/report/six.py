@@ -6,12 +6,12 @@ from functools import partial
 import numpy as np
 
 from orient_eye.errors import InputError
-from orient_eye.figures.gaze import antagonist_correlation
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.figures.gaze.beside_group import axial_main_sequences
 from orient_eye.learning.figures.gaze import main_sequence_saccades
 from orient_eye.learning.sequences import imposed
 from orient_eye.listing import fit_plane
-from orient_eye.recording.muscles import Muscles
+from orient_eye.movement.antagonists import antagonist_correlation
 from orient_eye.report.evidence import Evidence, Judged
 from orient_eye.report.exhibit import Drawn, Exhibit
 

@@ -63,6 +63,9 @@ class GazeTargets:
             "evaluation_pairs": 24,
         }
     )
+    _LEARNING_OF_MANY: Mapping[str, Any] = MappingProxyType(
+        {**learning, "updates": 36_000, "saccades_per_update": 8, "updates_per_rollout": 16}
+    )
 
     def __init__(
         self,
@@ -75,6 +78,8 @@ class GazeTargets:
     ) -> None:
         many = redundant(plant.motors)
         self.actions = "generator-ratios" if many else "residual"
+        if many:
+            self.learning = self._LEARNING_OF_MANY
         limit_deg = (REDUNDANT_LIMIT_DEG if many else LIMIT_DEG) if limit_deg is None else limit_deg
         limit_deg = real("the cone of gaze targets", limit_deg, LEAST_DEG, 89.0, unit="deg from straight ahead")
         torsion_deg = real("torsion of starts", torsion_deg, 0.0, 89.0, unit="deg")

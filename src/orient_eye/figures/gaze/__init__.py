@@ -8,7 +8,7 @@ without pyplot. Gaze is told to the left and up of straight ahead (`orient_eye.m
 the eye sees it, left on the left. Torsion and rotation vectors are those of `orient_eye.listing`.
 """
 
-from orient_eye.figures.gaze.antagonists import antagonist_correlation, antagonists_over_time
+from orient_eye.figures.gaze.antagonists import antagonists_over_time
 from orient_eye.figures.gaze.beside_group import main_sequence_beside_group
 from orient_eye.figures.gaze.components import component_velocities
 from orient_eye.figures.gaze.listing import listing_plane, torsion_over_time
@@ -19,7 +19,6 @@ from orient_eye.figures.gaze.sequence import saccade_sequence
 from orient_eye.figures.gaze.statics import torsion_maps, workspace
 
 __all__ = [
-    "antagonist_correlation",
     "antagonists_over_time",
     "component_velocities",
     "gaze_paths",

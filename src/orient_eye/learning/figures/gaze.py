@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from orient_eye import rotations
+from orient_eye.eyes.muscles import Muscles
 from orient_eye.figures import gaze as of_any_saccades
 from orient_eye.figures import tidy
 from orient_eye.figures.gaze.human import draw_human
@@ -17,6 +18,7 @@ from orient_eye.learning.evaluation import Yardstick
 from orient_eye.learning.figures.saccades import BEST, LEARNED, Saccades, titled
 from orient_eye.learning.policy import Policy
 from orient_eye.listing import fit_plane, rotation_vectors
+from orient_eye.movement.antagonists import antagonist_correlation
 from orient_eye.movement.oblique import (
     end_of_shift,
     seen_from,
@@ -25,7 +27,6 @@ from orient_eye.movement.oblique import (
     toward,
     transient_torsion,
 )
-from orient_eye.recording.muscles import Muscles
 from orient_eye.task.generator_actions import GeneratorActions
 from orient_eye.task.saccade import SaccadeTask
 
@@ -82,7 +83,7 @@ def gaze_pictures(policy: Policy, pairs: Yardstick) -> dict[str, Figure]:
     antagonists = None if muscles is None else muscles.pairs
     if antagonists is not None:
         between = few.trajectory[_BETWEEN], few.of_gaze[_BETWEEN]
-        correlation = of_any_saccades.antagonist_correlation(made.trajectory, made.of_gaze, antagonists)
+        correlation = antagonist_correlation(made.trajectory, made.of_gaze, antagonists)
         error = rotations.angle_between_directions(rotations.gaze(made.of_gaze.final), rotations.gaze(made.target))
         of_muscles = {
             "muscles": of_any_saccades.antagonists_over_time(*between, antagonists, correlation),
