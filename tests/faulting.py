@@ -88,6 +88,10 @@ LINES = {
         "listing --plant viscous --quiet", "result.json", "statics.csv", "workspace.png", "torsion.png", "plane.png",
         slow=True,
     ),
+    "listing six": _run(
+        "listing --plant tavares --eye six --quiet", "result.json", "statics.csv", "reach.png", "planes.png", "motors.png",
+        "antagonists.png", "stiffness.png",
+    ),
     "listing POLICY": _run(
         "listing modal-gaze --saccades 8 --quiet",
         "result.json", "sequence.csv", "sequence.rrd", "plane.png", "torsion.png", slow=True,

@@ -118,20 +118,25 @@ class TrainConfig:
     preset: Literal["ours", "thesis"] = "ours"
     """Defaults of the options below: ours (minutes), or the thesis' own (4.6; many hours on a CPU)."""
     updates: Annotated[
-        int | None, _default("10000, 7000 on a simulated eye; gaze 26000, with --from 4000; thesis 300000")
+        int | None,
+        _default("10000, 7000 on a simulated eye; gaze 26000, 72000 of six motors; with --from 4000; thesis 300000"),
     ] = None
     """How many times the networks are updated; a multiple of 8 is quickest with ours."""
-    saccades_per_update: Annotated[int | None, _default("16; thesis 1")] = None
+    saccades_per_update: Annotated[int | None, _default("16; gaze of six motors 4; thesis 1")] = None
     """Fresh saccades performed for each update."""
-    updates_per_rollout: Annotated[int | None, _default("8, or what divides the updates; thesis 1")] = None
+    updates_per_rollout: Annotated[
+        int | None, _default("8, 32 of six motors, or what divides the updates; thesis 1")
+    ] = None
     """Updates between two rollouts: a rollout performs the saccades of that many updates in one batch."""
-    batch_size: Annotated[int | None, _default("512; gaze 1024; thesis 8196")] = None
+    batch_size: Annotated[int | None, _default("512; gaze of three motors 1024; thesis 8196")] = None
     """Saccades that one update learns from."""
     replay_size: Annotated[int | None, _default("60000; gaze 150000; thesis 30000")] = None
     """Saccades that the replay buffer holds."""
     warmup: Annotated[int | None, _default("4096; with --from 512; thesis 8196")] = None
     """Saccades with random actions before the first update."""
-    learning_rate: Annotated[float | None, _default("0.003; with --from 0.001; thesis 0.00001")] = None
+    learning_rate: Annotated[
+        float | None, _default("0.003, gaze of six motors 0.002; with --from 0.001; thesis 0.00001")
+    ] = None
     """Learning rate of the optimiser (Adam)."""
     last_learning_rate: Annotated[float | None, _default("0.03; thesis 1")] = None
     """Share of the learning rate that is left at the end; it falls linearly over the last 60 % of the run."""

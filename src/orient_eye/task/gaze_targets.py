@@ -64,7 +64,14 @@ class GazeTargets:
         }
     )
     _LEARNING_OF_MANY: Mapping[str, Any] = MappingProxyType(
-        {**learning, "updates": 36_000, "saccades_per_update": 8, "updates_per_rollout": 16}
+        {
+            **learning,
+            "updates": 72_000,
+            "batch_size": 512,
+            "learning_rate": 0.002,
+            "saccades_per_update": 4,
+            "updates_per_rollout": 32,
+        }
     )
 
     def __init__(

@@ -5,11 +5,12 @@
     actions.plain                                    # the same by B and k0 themselves
 
 Each motor goes to where the eye is held in the target's direction (`orient_eye.plants.fixation`): the end point needs
-no learning, and Listing's law at rest is that of the statics, imposed. Its way there has two parts: what carries the
-gaze sideways, and what carries it up or down. Each part has a generator of its own, as in the brainstem (horizontal:
-the paramedian pontine reticular formation; vertical and torsional: the rostral interstitial nucleus of the medial
-longitudinal fasciculus). So muscles that hold the eye's yaw while others turn it up or down do it in time with them.
-With one generator for each group of motors they cannot, and some saccades up or down take five times as long.
+no learning, and Listing's law at rest is that of the statics, imposed. Two generators share the work, as in the
+brainstem: what carries the gaze sideways (there the paramedian pontine reticular formation) drives the horizontal
+recti, what carries it up or down and rolls it (the rostral interstitial nucleus of the medial longitudinal fasciculus)
+drives all muscles. So the horizontal recti, which hold the eye's yaw while the others turn it up or down, do it in time
+with them. With one generator for each group of motors they cannot, and some saccades up or down take five times as
+long.
 
 A policy's numbers are ratios to usual ones, as in `orient_eye.task.residual_actions`; those of the plain actions are B
 and k0.
@@ -108,8 +109,9 @@ class GeneratorActions(ActionSpace):
     def ways(self, start: State, target: Array) -> Array:
         """By how much each generator takes each motor, (saccades, generators, motors).
 
-        Of directions: the way from start to target along two sides of a rectangle of yaw and pitch, the mean of both
-        orders. What is left, of a start that has another torsion, goes with up and down.
+        Of directions: from start to target along two sides of a rectangle of yaw and pitch, the mean of both orders,
+        what the muscles that turn the eye sideways do along the side of yaw is the generator's for sideways, and all
+        else is the other's.
         """
         ends = rotations.gaze(start.orientation), rotations.gaze(target)
         to = self.fixations.motor(ends[1])
@@ -123,7 +125,9 @@ class GeneratorActions(ActionSpace):
         from_, first, then = (
             self.fixations.motor(listing.directions(*at)) for at in ((yaw, pitch), (yaw_to, pitch), (yaw, pitch_to))
         )
-        sideways = (first - from_ + to - then) / 2
+        sideways = np.zeros_like(whole)
+        horizontal = self.members[0]
+        sideways[:, horizontal] = ((first - from_ + to - then) / 2)[:, horizontal]
         return np.stack([sideways, whole - sideways], axis=1)
 
     def command(self, start: State, target: Array, action: Array) -> Command:
@@ -145,7 +149,7 @@ AT_START, OF_RATE = 0.7, (0.92, 1.24)
 it ends to the power of 0.3: the same optima (within -20 and +20 %)."""
 OF_POLE = 0.9
 """k0 over the pole by which the eye follows the motors at rest, on a plant of which only that is known."""
-_B, _K0 = 0.35, 0.3  # of the natural logarithm, to either side
+_B, _K0 = 0.35, (0.3, 0.5)  # of the natural logarithm, to either side
 
 
 class GeneratorRatios(GeneratorActions):
@@ -158,10 +162,11 @@ class GeneratorRatios(GeneratorActions):
     kind = "generator-ratios"
 
     def _numbers(self) -> tuple[Number, ...]:
+        plain, k0 = super()._numbers(), _K0 if self.generators == "directions" else (_K0[1],) * len(self.members)
+        widths = (far for each in k0 for far in (_B, each))
         return tuple(
             replace(number, symbol=f"{number.symbol}_ratio", unit="", low=np.exp(-far), high=np.exp(far), fine=0.1)
-            for number in super()._numbers()
-            for far in (_B if number.symbol == "B" else _K0,)
+            for number, far in zip(plain, widths, strict=True)
         )
 
     @cached_property

@@ -120,7 +120,8 @@ def in_all_directions(task: SaccadeTask, error_deg: float | None = None) -> tupl
         error_deg: end-point error with which one can live [deg], at 5 deg; None for 4.4.5.
     """
     if redundant(task.plant.motors):
-        return dict(CABLES), "rounded from thesis 4.4.5 on the six-motor eye at B = 45 (docs/six.md)"
+        force = {} if knows_elastics(task.plant) else {"force": 0.0}
+        return {**CABLES, **force}, "rounded from thesis 4.4.5 on the six-motor eye at B = 45 (docs/six.md)"
     targets, plain = make_targets(None, task.plant), task.actions.plain
     of_pulse = {key: plain.identity().get(key) for key in ("pulse", "C", "speed_limit")}
     options = {key: value for key, value in of_pulse.items() if value is not None}
