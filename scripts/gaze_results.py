@@ -37,6 +37,7 @@ from orient_eye.learning.policy import Policy
 from orient_eye.learning.sequences import drawn, ficks_starts, listing_numbers, sequence, stretching
 from orient_eye.plants import make_plant
 from orient_eye.progress import progress_bar
+from orient_eye.statics import cables_of
 from orient_eye.task.gaze_targets import GazeTargets
 from orient_eye.task.saccade import SaccadeTask
 
@@ -151,7 +152,13 @@ def judged(policy: Policy, pairs: int, eye: str = "thesis", case: str = "1") -> 
     mine = replace(own, actions=policy.task(own.plant).actions)
     yardstick = Yardstick(mine, start, target, best.optimum)
     numbers, _ = measure_policy(policy, yardstick, yardstick[:6])
-    return {name: value for name, value in numbers.items() if name not in ("numbers", "table")}
+    told = {name: value for name, value in numbers.items() if name not in ("numbers", "table")}
+    cables = cables_of(own.plant)
+    if cables is not None:
+        _, made, _ = yardstick.perform(policy.act)
+        held = cables.state(made.measures.final, made.command.final).good
+        told["ends_slack_or_unstable"] = int((~held).sum())
+    return told
 
 
 def in_sequence(policy: Policy, task: SaccadeTask, sequences: int = 1, *, from_fick: bool = False) -> dict[str, Any]:

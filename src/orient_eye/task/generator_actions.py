@@ -45,6 +45,7 @@ RATES = PulseRates((15.0, 220.0), (2.0, 50.0))
 _SIDEWAYS = 2  # among the axes of a turn: about z
 _DIRECTIONS = ("sideways", "updown")
 _LARGEST_DEG, _SMALLEST_DEG = 90.0, 1.0
+_TRIM = 0.1  # of the amplitude, to either side
 
 
 class GeneratorActions(ActionSpace):
@@ -98,7 +99,7 @@ class GeneratorActions(ActionSpace):
             Number(symbol, "1/s", name, bounds[symbol].low, bounds[symbol].high, True, fine, symbol == "k0")
             for name in (_DIRECTIONS if self.generators == "directions" else groups)
             for symbol, fine in (("B", 0.05), ("k0", 0.03))
-        )
+        ) + ((Number("trim", "", "", -_TRIM, _TRIM, fine=0.05),) if self.generators == "directions" else ())
 
     def identity(self) -> dict[str, Any]:
         """Kind, what generators are for, rule of torsion, motors, pulse, C, and bounds."""
@@ -130,10 +131,22 @@ class GeneratorActions(ActionSpace):
         sideways[:, horizontal] = ((first - from_ + to - then) / 2)[:, horizontal]
         return np.stack([sideways, whole - sideways], axis=1)
 
+    def aside(self, target: Array) -> Array:
+        """By how much the motors that turn the eye sideways move for a degree of yaw at the target, (saccades, motors)."""
+        yaw, pitch = rotations.to_euler(target)[:2]
+        ends = (self.fixations.motor(listing.directions(yaw + side, pitch)) for side in (0.5, -0.5))
+        found = np.subtract(*ends)
+        others = np.setdiff1d(np.arange(found.shape[1]), self.members[0])
+        found[:, others] = 0.0
+        return np.asarray(found)
+
     def command(self, start: State, target: Array, action: Array) -> Command:
         """The motors' command."""
-        told = np.asarray(action, float).reshape(len(start), -1, 2)
-        ways = self.ways(start, target)
+        told, ways = np.asarray(action, float), self.ways(start, target)
+        if self.generators == "directions":
+            told, trim = told[:, :-1], told[:, -1] * _size(start, target)
+            ways = ways + np.array([1.0, -1.0])[:, None] * (trim[:, None] * self.aside(target))[:, None]
+        told = told.reshape(len(start), -1, 2)
         return Generators(start.motor, ways, told[..., 0], told[..., 1], self.each.pulse, self.each.C)
 
     def likely(self, target: Array) -> Array:
@@ -164,10 +177,11 @@ class GeneratorRatios(GeneratorActions):
     def _numbers(self) -> tuple[Number, ...]:
         plain, k0 = super()._numbers(), _K0 if self.generators == "directions" else (_K0[1],) * len(self.members)
         widths = (far for each in k0 for far in (_B, each))
-        return tuple(
+        ratios = tuple(
             replace(number, symbol=f"{number.symbol}_ratio", unit="", low=np.exp(-far), high=np.exp(far), fine=0.1)
-            for number, far in zip(plain, widths, strict=True)
+            for number, far in zip(plain, widths, strict=False)
         )
+        return ratios + plain[len(ratios) :]
 
     @cached_property
     def plain(self) -> GeneratorActions:
@@ -179,14 +193,16 @@ class GeneratorRatios(GeneratorActions):
 
     def as_plain(self, start: State, target: Array, action: Array) -> Array:
         """See `orient_eye.task.actions.ActionSpace`; inside the bounds of B and k0."""
-        ratio = np.asarray(action, float).reshape(len(start), -1, 2)
+        action = np.asarray(action, float)
+        ratio = action[:, : 2 * len(self.members)].reshape(len(start), -1, 2)
         ends = rotations.gaze(start.orientation), rotations.gaze(target)
-        size = np.clip(rotations.angle_between_directions(*ends), _SMALLEST_DEG, _LARGEST_DEG)
+        size = np.clip(_size(start, target), _SMALLEST_DEG, _LARGEST_DEG)
         way = np.abs(ends[1] - ends[0])
         sideways = way[:, 1] / np.maximum(np.hypot(way[:, 1], way[:, 2]), 1e-12)
         B = self._B_of_1_deg * size**-FALLS * np.exp(-SIDEWAYS * sideways)
         plain = np.stack([B[:, None] * ratio[..., 0], self._usual_k0(ends) * ratio[..., 1]], axis=-1)
-        return np.clip(plain.reshape(len(start), -1), self.plain.low, self.plain.high)
+        plain = np.concatenate([plain.reshape(len(start), -1), action[:, 2 * len(self.members) :]], axis=1)
+        return np.clip(plain, self.plain.low, self.plain.high)
 
     @cached_property
     def _B_of_1_deg(self) -> float:
@@ -206,6 +222,11 @@ class GeneratorRatios(GeneratorActions):
     def command(self, start: State, target: Array, action: Array) -> Command:
         """The motors' command."""
         return self.plain.command(start, target, self.as_plain(start, target, action))
+
+
+def _size(start: State, target: Array) -> Array:
+    """Amplitudes [deg], (saccades,)."""
+    return rotations.angle_between_directions(rotations.gaze(start.orientation), rotations.gaze(target))
 
 
 def _members(plant: Plant, index: Sequence[int], generators: Kind) -> list[list[int]]:
