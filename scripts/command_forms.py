@@ -3,10 +3,10 @@
     python scripts/command_forms.py                  # 18 saccades; half an hour on two cores
     python scripts/command_forms.py --saccades 6 --forms generators each
 
-The same weights, saccades and effort for all: `each` has B, D and k0 of each motor (18 numbers), `pairs` and `axes` one
-B and k0 for each pair of antagonists, or for the muscles that turn the eye sideways and the others (6, 4; D from the
-statics), `generators` one for each direction of gaze, shared by all muscles (4). The ratio is the mean reward over that
-of the first row: above 1 is worse.
+The same weights, saccades and effort for all: `each` has B, D and k0 of each motor (18 numbers), `pairs` and `axes`
+one B and k0 for each pair of antagonists, or for the muscles that turn the eye sideways and the others (6, 4; D from
+the statics), `generators` one for each direction of gaze, shared by all muscles, and a trim (5). The ratio is the mean
+reward over that of the first row: above 1 is worse.
 """
 
 import json

@@ -89,8 +89,8 @@ LINES = {
         slow=True,
     ),
     "listing six": _run(
-        "listing --plant tavares --eye six --quiet", "result.json", "statics.csv", "reach.png", "planes.png", "motors.png",
-        "antagonists.png", "stiffness.png",
+        "listing --plant tavares --eye six --quiet",
+        "result.json", "statics.csv", "reach.png", "planes.png", "motors.png", "antagonists.png", "stiffness.png",
     ),
     "listing POLICY": _run(
         "listing modal-gaze --saccades 8 --quiet",

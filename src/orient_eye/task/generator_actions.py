@@ -1,7 +1,7 @@
 """Actions of an eye that has more motors than axes: pulse-step generators that its motors share, D from the statics.
 
     actions = GeneratorActions(plant, driven=("IR", "MR", "SR", "LR", "IO", "SO"), pulse="smooth")
-    actions.names                                    # ("B_sideways", "k0_sideways", "B_updown", "k0_updown")
+    actions.names                                    # ("B_sideways", "k0_sideways", "B_updown", "k0_updown", "trim")
     actions.plain                                    # the same by B and k0 themselves
 
 Each motor goes to where the eye is held in the target's direction (`orient_eye.plants.fixation`): the end point needs
@@ -9,11 +9,12 @@ no learning, and Listing's law at rest is that of the statics, imposed. Two gene
 brainstem: what carries the gaze sideways (there the paramedian pontine reticular formation) drives the horizontal
 recti, what carries it up or down and rolls it (the rostral interstitial nucleus of the medial longitudinal fasciculus)
 drives all muscles. So the horizontal recti, which hold the eye's yaw while the others turn it up or down, do it in time
-with them. With one generator for each group of motors they cannot, and some saccades up or down take five times as
-long.
+with them. What turns the eye up or down kicks it aside a little, and that dies away slowly; so the generator for
+sideways may aim beside the target by a share of the amplitude, the trim, which the other one takes back. With one
+generator for each group of motors they cannot do either, and some saccades up or down take five times as long.
 
-A policy's numbers are ratios to usual ones, as in `orient_eye.task.residual_actions`; those of the plain actions are B
-and k0.
+A policy's numbers are the trim, and ratios to usual ones, as in `orient_eye.task.residual_actions`; those of the plain
+actions are B, k0 and the trim.
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,7 +50,7 @@ _TRIM = 0.1  # of the amplitude, to either side
 
 
 class GeneratorActions(ActionSpace):
-    """B and k0 of each generator.
+    """B and k0 of each generator; of directions also the trim.
 
     Args:
         plant: whose motors are commanded.
@@ -132,7 +133,7 @@ class GeneratorActions(ActionSpace):
         return np.stack([sideways, whole - sideways], axis=1)
 
     def aside(self, target: Array) -> Array:
-        """By how much the motors that turn the eye sideways move for a degree of yaw at the target, (saccades, motors)."""
+        """By how much motors that turn the eye sideways move for a degree of yaw at the target, (saccades, motors)."""
         yaw, pitch = rotations.to_euler(target)[:2]
         ends = (self.fixations.motor(listing.directions(yaw + side, pitch)) for side in (0.5, -0.5))
         found = np.subtract(*ends)
