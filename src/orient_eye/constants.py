@@ -14,5 +14,7 @@ STEP_S = 0.001
 """Interval between the samples of commands and trajectories (thesis 3.2)."""
 LONGEST_S = 3600.0
 """No movement is simulated longer than this."""
+EYE = "thesis"
+"""Preset of the eye, where none is named (`orient_eye.eyes.EYES`)."""
 ANGLES = ("yaw", "pitch", "roll")
 """By which an orientation is told: turns about z, y and x (`orient_eye.rotations`)."""

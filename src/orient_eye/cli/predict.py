@@ -152,6 +152,8 @@ class Predict:
         """The command that simulates the written one, as it can be typed."""
         import shlex
 
+        from orient_eye.constants import EYE
+
         words = ["orient-eye", "simulate", "--motor", str(self.command)]
         surrogate = getattr(task.plant, "surrogate", None)
         stranger = surrogate is not None and surrogate.eye is None  # whose motors are none of the default plant's
@@ -160,6 +162,12 @@ class Predict:
             return f"{shlex.join(words)}, with the surrogate that the policy has learned on (--surrogate and its file)"
         if stranger or limited:
             words += ["--plant", task.plant.name]
+        identity = task.plant.identity()
+        eye = identity.get("eye") or getattr(surrogate, "eye", None) or EYE
+        if eye != EYE:
+            words += ["--eye", eye]
+        if "pretension" in identity:
+            words += ["--pretension", f"{identity['pretension']:g}"]
         if file is not None:
             words += ["--surrogate", file]
         if limited:  # the file ends where the motors stand

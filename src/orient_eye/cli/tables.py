@@ -92,14 +92,15 @@ def saccade_columns(task: "SaccadeTask", row: Row, *, terms: bool = False) -> di
         "saccade [deg]": lambda row: f"{told('start', row)} to {told('target', row)}"
     }
     actions = task.actions.plain
-    driven = dict.fromkeys(told_of.motor for told_of in actions.numbers)
+    driven = dict.fromkeys(told_of.motor for told_of in actions.numbers if told_of.motor)
     if len(driven) > 1:
         columns["motor"] = lambda row: "\n".join(driven)
     columns |= {f"F [{unit}]": _stacked(keys, ".3f") for unit, keys in _starts(row).items()}
     keys: dict[str, list[str]] = {}
     for name, told_of in zip(actions.names, actions.numbers, strict=True):
         key = name if name in row else f"{name}_{told_of.unit}"
-        keys.setdefault(f"{told_of.symbol} [{told_of.unit}]", []).append(key)
+        heading = f"{told_of.symbol} [{told_of.unit}]" if told_of.unit else told_of.symbol
+        keys.setdefault(heading, []).append(key)
     columns |= {heading: _stacked(of_motors, ".5g") for heading, of_motors in keys.items()}
     for key in row:
         if key == "C" or key.startswith("C_"):

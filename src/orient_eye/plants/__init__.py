@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
+from orient_eye.constants import EYE
 from orient_eye.errors import InputError
 from orient_eye.eyes import EYES
 from orient_eye.registry import Registry, load
@@ -200,7 +201,7 @@ class PlantKind:
     restore: Callable[[dict[str, Any]], Plant] | str | None = None
 
 
-_EYE = Option("eye", str, "thesis", f"Preset of the eye ({', '.join(EYES)}), or an MJCF file of the same form.")
+_EYE = Option("eye", str, EYE, f"Preset of the eye ({', '.join(EYES)}), or an MJCF file of the same form.")
 _RIG = Option("rig", str, None, "Limits of its motors: a rig's TOML file, or a shipped one (prototype).")
 _GRAVITY = Option("gravity", bool, False, "With the gravity torque.")
 _PRETENSION = Option("pretension", float, None, "Of an eye that has several: 1 or 2 of six.")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from orient_eye.cached import cached_property
 from orient_eye.checks import whole
+from orient_eye.constants import EYE
 from orient_eye.errors import InputError
 from orient_eye.files import read_json
 from orient_eye.learning.evaluation import Yardstick, evaluation_saccades
@@ -37,8 +38,6 @@ Array = NDArray[np.float64]
 COURSE = "metrics.csv"
 """How a training went, beside its policy."""
 _OF_COURSE = ("saccades", "reward_mean", "gap_mean")
-EYE = "thesis"
-"""Of a plant that names none."""
 STEPS_DEG = tuple(float(a) for a in range(1, 26))
 """Amplitudes of the motor's steps, as `orient-eye sysid` takes them."""
 MAIN_SEQUENCE_DEG = np.array([1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12.5, 15, 17.5, 20, 25, 30, 35, 40, 50, 60], float)
