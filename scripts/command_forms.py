@@ -5,7 +5,7 @@
 
 The same weights, saccades and effort for all: `each` has B, D and k0 of each motor (18 numbers), `pairs` and `axes`
 one B and k0 for each pair of antagonists, or for the muscles that turn the eye sideways and the others (6, 4; D from
-the statics), `generators` one for each direction of gaze, shared by all muscles, and a trim (5). The ratio is the mean
+the statics), `generators` one for each direction of gaze and a trim (5). The ratio is the mean
 reward over that of the first row: above 1 is worse.
 """
 

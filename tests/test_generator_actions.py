@@ -1,5 +1,8 @@
 """Generators that motors share, and actions of an eye with more motors than axes: meaning, and where they end."""
 
+import copy
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
@@ -221,6 +224,11 @@ def test_restored_tasks_are_the_same(task: SaccadeTask) -> None:
     again = SaccadeTask.restore(task.identity())
     assert again.identity() == task.identity()
     assert SaccadeTask.restore(task.identity(), make_plant("mujoco", eye="six")).actions.names == task.actions.names
+
+
+def test_copies_are_the_same_task(task: SaccadeTask) -> None:
+    for again in (copy.deepcopy(task), pickle.loads(pickle.dumps(task))):
+        assert again.identity() == task.identity()
 
 
 def test_the_environment_has_five_numbers() -> None:

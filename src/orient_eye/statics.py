@@ -108,7 +108,14 @@ class Workspace:
 def cables_of(plant: Plant) -> Cables | None:
     """How a plant with more motors than axes shares the work; None for one that has nothing to share."""
     plant = plant.twin() or plant
-    return plant.cables if isinstance(plant, ElasticPlant) and plant.redundant else None
+    if not isinstance(plant, ElasticPlant) or not plant.redundant:
+        return None
+    if not plant.wound:
+        raise InputError(
+            f"the {len(plant.motors)} motors of plant {plant.name!r} are more than the axes, and not all of them wind "
+            "up cables: of such an eye no statics are told; choose an eye with three arms, or with spindles alone"
+        )
+    return plant.cables
 
 
 @dataclass(frozen=True)

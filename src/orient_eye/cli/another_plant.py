@@ -21,6 +21,14 @@ class AnotherPlant:
     force: bool = False
     """Use the policy although the plant is not the one it was trained on."""
 
+    def _of_policy(self, name: str, own: dict[str, Any]) -> dict[str, Any]:
+        """Eye and pretension of the policy's plant, for another kind of plant that has such, unless they are told."""
+        from orient_eye.plants import PLANTS
+
+        known = {option.name for option in PLANTS[name].options} - set(self.plant_options)
+        told = ("pretension",) if self.plant_options.get("eye", own.get("eye")) == own.get("eye") else ()
+        return {key: own[key] for key in ("eye", *told) if key in own and key in known}
+
     def task(self, policy: "Policy") -> "tuple[SaccadeTask, list[str]]":
         """The task on that plant, and in words what differs from the one the policy was trained on.
 
@@ -34,7 +42,7 @@ class AnotherPlant:
         own = policy.manifest["task"]["plant"]
         plant = None
         if self.plant is not None:
-            plant = make_plant(self.plant, **self.plant_options)
+            plant = make_plant(self.plant, **self._of_policy(self.plant, own), **self.plant_options)
         elif self.plant_options:  # of its own plant only the limits can be others
             plant = restore_plant(own, **self.plant_options)
             same = json.loads(json.dumps(plant.identity(), default=plain)) == own

@@ -57,9 +57,9 @@ class Simulate:
         from orient_eye.cli.tables import say
         from orient_eye.commands.motor_file import read_command
         from orient_eye.constants import LONGEST_S, STEP_S
-        from orient_eye.eyes.muscles import Muscles
         from orient_eye.figures.trajectory import draw_trajectory
         from orient_eye.plants import make_plant
+        from orient_eye.plants.cables import muscles_of
         from orient_eye.plants.limited_motor import peaks
         from orient_eye.plants.limits import wiring
         from orient_eye.recording import record
@@ -79,7 +79,7 @@ class Simulate:
         run = RunDirectory.create(self.out, "simulate", self)
         trajectory.save_npz(run.path / "trajectory.npz")
         trajectory.to_csv(run.path / "trajectory.csv")
-        muscles = Muscles.of(plant.drawn())
+        muscles = muscles_of(plant)
         draw_trajectory(trajectory, run.path / "trajectory.png", None if muscles is None else muscles.pairs)
         record(
             run.path / "trajectory.rrd",

@@ -78,7 +78,7 @@ class Weights:
             return self._nearest_to_people(plant, targets)
         terms = [name for name in JUDGES[targets.of].names if name != "energy"]
         steps = Steps(self.step_B, self.step_D, self.step_k0)
-        rows = [self._solve(plant, targets, name, case, steps) for name, case in self._cases().items()]
+        rows = [self._solve(plant, targets, name, case, steps) for name, case in self._cases(plant, targets).items()]
         solved = [k for k in rows[0] if k.split("_")[0] in ("D", "k0") and any(row[k] is not None for row in rows)]
         columns = {
             "case": lambda row: row["case"],
@@ -111,22 +111,29 @@ class Weights:
             )
         return nearest_to_people(plant, targets, self.like, self.problem.band, quiet=self.quiet)
 
-    def _cases(self) -> "dict[str, str | Case]":
+    def _cases(self, plant: "Plant", targets: "Targets") -> "dict[str, str | Case]":
         """The cases that were asked for, by what to call them."""
         from orient_eye.cli.tables import say
         from orient_eye.errors import InputError
         from orient_eye.task.cases import CASES
+        from orient_eye.task.judge import JUDGES
 
         if self.problem.pulse is not None or self.problem.C is not None:
             return {f"pulse {self.problem.pulse}": self.problem.case(None if self.case == "all" else self.case)}
         if self.case != "all":
             return {self.case: self.case}
         cases: dict[str, str | Case] = {}
+        left_out: dict[str, InputError] = {}
         for name in CASES:
             try:
+                self.problem.task(plant, targets, CASES[name], JUDGES[targets.of].any_weights)
                 cases[name] = CASES[name]
-            except InputError as error:  # another package's
-                say(f"note: case {name!r} is left out: {error}", "yellow")
+            except InputError as error:  # another package's, or none of these targets
+                left_out[name] = error
+        if not cases:
+            raise next(iter(left_out.values()))
+        for name, error in left_out.items():
+            say(f"note: case {name!r} is left out: {error}", "yellow")
         return cases
 
     def _solve(

@@ -192,14 +192,15 @@ def motors(model: mujoco.MjModel, pretension: float | None = None) -> tuple[Moto
     Raises:
         InputError: no such key.
     """
-    working = (-WORKING_RANGE_DEG, WORKING_RANGE_DEG)
     rest = np.rad2deg(_rest_control(model, pretension))
     found = []
     for i in _motor_ids(model):
         low, high = np.rad2deg(model.actuator_ctrlrange[i]).tolist()
         limits = (low, high) if model.actuator_ctrllimited[i] else (-np.inf, np.inf)
         of_arm = model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
-        found.append(Motor(model.actuator(i).name, "deg", limits, working if of_arm else limits, rest=float(rest[i])))
+        at = float(rest[i])
+        working = (at - WORKING_RANGE_DEG, at + WORKING_RANGE_DEG) if of_arm else limits
+        found.append(Motor(model.actuator(i).name, "deg", limits, working, rest=at))
     return tuple(found)
 
 

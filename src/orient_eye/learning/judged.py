@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orient_eye.eyes.muscles import Muscles
 from orient_eye.figures import save
 from orient_eye.learning import figures
 from orient_eye.learning.directions import in_all_directions
@@ -21,6 +20,7 @@ from orient_eye.learning.figures.saccades import Saccades
 from orient_eye.learning.gaze_numbers import gaze_numbers, stretching
 from orient_eye.learning.policy import Policy
 from orient_eye.movement.antagonists import antagonist_correlation
+from orient_eye.plants.cables import muscles_of
 from orient_eye.recording import record
 from orient_eye.task.table import outcome_columns, rows_of, with_peaks
 from orient_eye.words import plant_in_words
@@ -73,7 +73,7 @@ def _of_gaze(policy: Policy, pairs: Yardstick, action: Array) -> dict[str, float
 
 def _of_antagonists(made: Saccades) -> dict[str, float]:
     """How the motors of antagonists correlate, by their names; none where an eye has no such muscles."""
-    muscles = Muscles.of(made.task.plant.drawn())
+    muscles = muscles_of(made.task.plant)
     if muscles is None:
         return {}
     found = antagonist_correlation(made.trajectory, made.of_gaze, muscles.pairs)

@@ -20,6 +20,7 @@ from orient_eye.checks import real
 from orient_eye.errors import InputError
 from orient_eye.eyes.muscles import Muscles
 from orient_eye.motor import Motor, names, ranges, rests
+from orient_eye.plants import Plant
 from orient_eye.plants.equilibrium import Torque, least_stiffness, stiffness
 from orient_eye.registry import Registry
 
@@ -181,7 +182,7 @@ class Cables:
         if self.muscles is None:
             raise InputError(
                 f"the motors of plant {self.plant!r} ({', '.join(names(self.motors))}) are not pairs of antagonists "
-                "with a cable each; choose the criterion least-change"
+                "with a cable each, in the cables' order; --gaze and --motors answer by the criterion least-change"
             )
         return self.muscles.pairs
 
@@ -285,6 +286,12 @@ class Cables:
                 "to straight ahead"
             )
         return motor
+
+
+def muscles_of(plant: Plant) -> Muscles | None:
+    """Those of the eye that a plant draws, if they are what moves it; None for any other plant."""
+    found = Muscles.of(plant.drawn())
+    return found if found is not None and found.names == names(plant.motors) else None
 
 
 def _solved(P: Array, q: Array, lines: Lines, bounds: Array, level: Array) -> Array:

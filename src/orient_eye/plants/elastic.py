@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from orient_eye.cached import cached_property
 from orient_eye.checks import whole
 from orient_eye.constants import HORIZON_S
+from orient_eye.errors import InputError
 from orient_eye.eyes import model as eyes
 from orient_eye.eyes.muscles import Muscles
 from orient_eye.motor import AXES, check_driven, ranges, redundant, rests
@@ -20,10 +21,11 @@ from orient_eye.plants.fixation import Fixations
 from orient_eye.plants.limits import Limits, are_limited, limited, limits_of, travel_s
 from orient_eye.plants.simulated import SimulatedPlant
 from orient_eye.rig import Rig
-from orient_eye.rotations import gaze, rotation
+from orient_eye.rotations import FORWARD, gaze, rotation
 
 Array = NDArray[np.float64]
 _MOST_THREADS = 1024
+_BALANCED = 1e-5  # N m: a keyframe's digits; a degree is worth about 5e-3
 
 
 class ElasticPlant(SimulatedPlant):
@@ -58,7 +60,7 @@ class ElasticPlant(SimulatedPlant):
         self.model = eyes.build_model(options["eye"], step_s=step_s, gravity=gravity, visual=False)
         own = eyes.motors(self.model, pretension)
         if own != eyes.motors(self.model):  # one eye, one identity
-            options = {**options, "pretension": pretension}
+            options = {**options, "pretension": None if pretension is None else float(pretension)}
         limits = {} if rig is None else limits_of(rig, own, self.name)
         self.motors = limited(own, limits)
         self.options = {**options, "rig": limits} if limits else options
@@ -72,7 +74,21 @@ class ElasticPlant(SimulatedPlant):
         self.doubt = state["doubt"]
 
     def _fit_to_limits(self) -> None:
-        """Horizon and bounds of pulses that suit limited motors; at the end of a constructor, as it asks torques."""
+        """Horizon and bounds of pulses that suit limited motors; at the end of a constructor, as it asks torques.
+
+        Raises:
+            InputError: an eye that spindles turn does not rest straight ahead where its motors rest.
+        """
+        if self.redundant and self.wound:
+            at, ahead = rests(self.motors)[None], FORWARD[None]
+            state, torque = self.cables.state(ahead, at), np.abs(self.torque(ahead, at)).max()
+            balanced = bool(self.options["gravity"]) or torque < _BALANCED
+            if not balanced or state.slack[0] or not state.stiffness[0] > 0:
+                raise InputError(
+                    f"eye {self.options['eye']!r} does not rest straight ahead, under tension, with its motors at "
+                    f"{np.round(at[0], 2).tolist()} deg: give it a keyframe pretension_N that says where they rest "
+                    "(CONTRIBUTING, add an eye)"
+                )
         if are_limited(self.motors):
             self.horizon_s = float(np.ceil(10 * (HORIZON_S + travel_s(self.motors))) / 10)
             self.pulse_rates = PulseRates.around(self.rates())
@@ -114,7 +130,7 @@ class ElasticPlant(SimulatedPlant):
         return redundant(self.motors)
 
     @cached_property
-    def _wound(self) -> bool:
+    def wound(self) -> bool:
         """Whether spindles alone pull, so that tension and torque follow the motors on straight lines."""
         return bool((eyes.Tendons.of(self.model).motor >= 0).all())
 
@@ -189,7 +205,7 @@ class ElasticPlant(SimulatedPlant):
         """See `orient_eye.plants.Plant`."""
         index = check_driven(self.motors, driven, self.name)
         working = np.array([motor.working for motor in self.motors])
-        if len(index) > AXES and self._wound:
+        if len(index) > AXES and self.wound:
             return self.cables.held(orientation, index, working)
         motor, held = equilibrium.held_motor(self.torque, orientation, rests(self.motors), index, working)
         return np.where(held[:, None], motor, np.nan)
@@ -197,6 +213,6 @@ class ElasticPlant(SimulatedPlant):
     def hold(self, orientation: Array, driven: tuple[str, ...]) -> Array:
         """See `orient_eye.plants.Plant`."""
         index = check_driven(self.motors, driven, self.name)
-        if len(index) > AXES and self._wound:
+        if len(index) > AXES and self.wound:
             return self.cables.hold(orientation, index, ranges(self.motors))
         return equilibrium.rest_motor(self.torque, orientation, rests(self.motors), index, ranges(self.motors))

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Rule = Literal["least force", "listing", "fick"]
 """How the torsion of a fixation is chosen."""
 _DEGREE, _SPOKES = 10, 32  # of the fits with as many rings: to 1e-4 deg
-_DEGREE_OF_MORE, _SPOKES_OF_MORE = 16, 48  # of more motors than axes: to 4e-4 deg
+_DEGREE_OF_MORE, _SPOKES_OF_MORE = 16, 48  # of more motors than axes: to 7e-4 deg at 40 deg, 3e-5 within 25
 _REACHES = np.arange(50.0, 0.0, -5.0)  # deg, tried from the largest
 _TORSIONS = np.arange(-12.0, 12.1, 3.0)  # deg, from which the least force is looked for
 _TORSIONS_OF_MORE = np.arange(-24.0, 24.1, 3.0)  # their plane is tilted

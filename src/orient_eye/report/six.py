@@ -12,6 +12,7 @@ from orient_eye.learning.figures.gaze import main_sequence_saccades
 from orient_eye.learning.sequences import imposed
 from orient_eye.listing import fit_plane
 from orient_eye.movement.antagonists import antagonist_correlation
+from orient_eye.plants.cables import muscles_of
 from orient_eye.report.evidence import Evidence, Judged
 from orient_eye.report.exhibit import Drawn, Exhibit
 
@@ -48,14 +49,13 @@ def _main_sequence(judged: Judged) -> str:
 
 def _listing(judged: Judged) -> str:
     wanted = fit_plane(judged.pairs.target)
-    return (
-        f"Ends scatter by {judged.gaze_numbers['listing_sd_deg']:.2f} deg about a plane, those that the statics want "
-        f"by {wanted.sd_deg:.2f} deg. {imposed(judged.task)}"
-    )
+    sd = judged.gaze_numbers["listing_sd_deg"]
+    scatter = "" if sd is None else f"Ends scatter by {sd:.2f} deg about a plane, those that the statics want "
+    return f"{scatter}{'' if sd is None else f'by {wanted.sd_deg:.2f} deg. '}{imposed(judged.task)}"
 
 
 def _muscles(judged: Judged) -> Muscles:
-    muscles = Muscles.of(judged.task.plant.drawn())
+    muscles = muscles_of(judged.task.plant)
     if muscles is None:
         raise InputError(f"the eye of policy {judged.name} has no antagonists with a motor each; give one of eye six")
     return muscles

@@ -33,6 +33,27 @@ TORSION_DEG = 0.6
 """Starts have up to so much torsion more or less than that of the least force, as a saccade may have ended."""
 RATES = PulseRates((12.0, 120.0), (2.0, 60.0))
 """Hold the best pulse-steps in all directions: the eye is slower up and down than to the sides."""
+_LEARNING: Mapping[str, Any] = MappingProxyType(
+    {
+        "updates": 26_000,
+        "batch_size": 1024,
+        "replay_size": 150_000,
+        "temperature": (0.02, 3e-4),
+        "doubt": 1e-3,
+        "evaluation_pairs": 24,
+    }
+)
+_LEARNING_OF_MORE: Mapping[str, Any] = MappingProxyType(
+    {
+        **_LEARNING,
+        "updates": 72_000,
+        "batch_size": 512,
+        "learning_rate": 0.002,
+        "saccades_per_update": 4,
+        "updates_per_rollout": 32,
+    }
+)
+"""Of more motors than axes."""
 _AROUND = 32  # directions at the edge of the cone, at which it is looked what the motors can hold
 _LESS = 0.8  # times the torsion, until they can
 
@@ -53,26 +74,6 @@ class GazeTargets:
 
     angles = ("yaw_deg", "pitch_deg")
     of: View = "gaze"
-    learning: Mapping[str, Any] = MappingProxyType(
-        {
-            "updates": 26_000,
-            "batch_size": 1024,
-            "replay_size": 150_000,
-            "temperature": (0.02, 3e-4),
-            "doubt": 1e-3,
-            "evaluation_pairs": 24,
-        }
-    )
-    _LEARNING_OF_MANY: Mapping[str, Any] = MappingProxyType(
-        {
-            **learning,
-            "updates": 72_000,
-            "batch_size": 512,
-            "learning_rate": 0.002,
-            "saccades_per_update": 4,
-            "updates_per_rollout": 32,
-        }
-    )
 
     def __init__(
         self,
@@ -85,8 +86,6 @@ class GazeTargets:
     ) -> None:
         many = redundant(plant.motors)
         self.actions = "generator-ratios" if many else "residual"
-        if many:
-            self.learning = self._LEARNING_OF_MANY
         limit_deg = (REDUNDANT_LIMIT_DEG if many else LIMIT_DEG) if limit_deg is None else limit_deg
         limit_deg = real("the cone of gaze targets", limit_deg, LEAST_DEG, 89.0, unit="deg from straight ahead")
         torsion_deg = real("torsion of starts", torsion_deg, 0.0, 89.0, unit="deg")
@@ -103,6 +102,11 @@ class GazeTargets:
         self.torsion_deg = self._held(torsion_deg)
         self.pulse_rates = plant.pulse_rates or (generator_actions.RATES if many else RATES)
         self.horizon_s = None if plant.horizon_s is None else max(plant.horizon_s, HORIZON_S)
+
+    @property
+    def learning(self) -> Mapping[str, Any]:
+        """See `orient_eye.task.targets.Targets`."""
+        return _LEARNING_OF_MORE if redundant(self.plant.motors) else _LEARNING
 
     def _held(self, torsion_deg: float) -> float:
         """The torsion that the motors hold, both ways, all around the edge of the cone."""

@@ -290,7 +290,7 @@ def make_targets(name: str | None, plant: Plant, **options: Any) -> Targets:
     for candidate in (*_NAMES.values(), "gaze"):
         with contextlib.suppress(InputError):  # the plant does not turn the eye about this axis: the next one
             return TARGETS[candidate](plant, **options)
-    return TARGETS["horizontal"](plant, **options)
+    return TARGETS["gaze" if redundant(plant.motors) else "horizontal"](plant, **options)
 
 
 def restore_targets(identity: dict[str, Any], plant: Plant, driven: tuple[str, ...]) -> Targets:

@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from orient_eye import rotations
-from orient_eye.eyes.muscles import Muscles
 from orient_eye.figures import gaze as of_any_saccades
 from orient_eye.figures import tidy
 from orient_eye.figures.gaze.human import draw_human
@@ -27,6 +26,7 @@ from orient_eye.movement.oblique import (
     toward,
     transient_torsion,
 )
+from orient_eye.plants.cables import muscles_of
 from orient_eye.task.generator_actions import GeneratorActions
 from orient_eye.task.saccade import SaccadeTask
 
@@ -79,8 +79,8 @@ def gaze_pictures(policy: Policy, pairs: Yardstick) -> dict[str, Figure]:
     every, few = main_sequence_saccades(task, policy), _few(task, policy)
     gap = Figure(figsize=(7.5, 5), layout="constrained")
     _draw_gap(gap.subplots(), policy, pairs)
-    muscles, of_muscles = Muscles.of(task.plant.drawn()), {}
-    antagonists = None if muscles is None else muscles.pairs
+    muscles, of_muscles = muscles_of(task.plant), {}
+    antagonists = None if muscles is None or few.trajectory.tension is None else muscles.pairs
     if antagonists is not None:
         between = few.trajectory[_BETWEEN], few.of_gaze[_BETWEEN]
         correlation = antagonist_correlation(made.trajectory, made.of_gaze, antagonists)
