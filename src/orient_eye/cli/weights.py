@@ -132,8 +132,8 @@ class Weights:
                 left_out[name] = error
         if not cases:
             raise next(iter(left_out.values()))
-        for name, error in left_out.items():
-            say(f"note: case {name!r} is left out: {error}", "yellow")
+        for name, why in left_out.items():
+            say(f"note: case {name!r} is left out: {why}", "yellow")
         return cases
 
     def _solve(
