@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 LOWEST := .venv-lowest
-EXTRAS := .[dev,onnx,physical,tensorboard]
+EXTRAS := .[dev,judges,onnx,physical,tensorboard]
 DEMO ?= demo
 PYTEST := -m pytest -n auto
 # A file's tests share what they prepare; files with slow tests begin first (tests/conftest.py).

@@ -32,6 +32,20 @@ def write_pool(folder: Path) -> Path:
         "sent_rad.csv": ("t_s,tau2_deg", (SENT_S, np.deg2rad(SENT))),
         "far.csv": ("t_s,tau2_deg", (SENT_S, 100 * SENT)),
     }
+    time = np.arange(0, 1.5, 0.002)
+    gaze, three, alike = (
+        sum(size * np.tanh((time - at) * 50) for at, size in moments.items())
+        for moments in ({0.5: 10}, {0.3: 3, 0.7: 6, 1.1: 9}, {0.3: 9, 0.7: -9, 1.1: 9})
+    )
+    tables |= {
+        "gaze.csv": ("t,x", (time, gaze)),
+        "gaze_ms.csv": ("t,x", (1000 * time, gaze)),
+        "gaze_back.csv": ("t,x", (time[::-1], gaze)),
+        "gaze_gaps.csv": ("t,x", (time, np.nan * gaze)),
+        "gaze_rad.csv": ("t,x", (time, np.deg2rad(gaze))),
+        "three.csv": ("t,x", (time, three)),
+        "alike.csv": ("t,x", (time, alike)),
+    }
     for name, (header, columns) in tables.items():
         np.savetxt(folder / name, np.column_stack(columns), delimiter=",", header=header, comments="")
     texts = {

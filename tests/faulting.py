@@ -6,6 +6,7 @@ at its imports. It has its own folder to stand in, and its own home, cache and t
 
 import csv
 import ctypes
+import gzip
 import json
 import multiprocessing
 import os
@@ -67,6 +68,15 @@ LINES = {
     "evaluate": _run("evaluate lpf-1 --pairs 5 --quiet", "result.json", "pairs.csv", "recording.rrd", *_PICTURES),
     "export --sb3": Line("export lpf-1 --sb3 {out}/policy.zip", ("policy.zip",)),
     "export --onnx": Line("export lpf-1 --onnx {out}/policy.onnx", ("policy.onnx",)),
+    "convert --bids": Line(
+        "convert lpf-1 --bids {out}",
+        ("README", "participants.tsv", "participants.json", "dataset_description.json", *(
+            f"sub-robot/beh/sub-robot_task-saccade_recording-eye1_physio{end}"
+            for end in (".tsv.gz", ".json", "events.tsv.gz", "events.json")
+        )), whole_run=True,
+    ),
+    "convert --parquet": Line("convert lpf-1 --parquet {out}/saccades.parquet", ("saccades.parquet",)),
+    "compare": _run("compare {given}/gaze.tsv.gz --policy lpf-1", "result.json", "saccades.csv", "main_sequence.png"),
     "predict --out": Line("predict lpf-1 --target 20 --out {out}/saccade.csv", ("saccade.csv",)),
     "predict --command --back": Line(
         "predict lpf-1 --target 20 --command {out}/there.csv --back {out}/back.csv", ("there.csv", "back.csv")
@@ -143,6 +153,12 @@ def _read_rrd(path: Path) -> None:
     subprocess.run([viewer._executable(), "rrd", "verify", str(path)], check=True, capture_output=True)
 
 
+def _read_parquet(path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    assert pq.read_table(path).num_rows
+
+
 def _ends(path: Path, last: str) -> None:
     assert path.read_text(encoding="utf-8").rstrip().endswith(last)
 
@@ -152,6 +168,8 @@ READERS: dict[str, Callable[[Path], object]] = {
     ".csv": _read_csv,
     ".png": imread,
     ".npz": _read_npz,
+    ".gz": lambda path: gzip.decompress(path.read_bytes()),
+    ".parquet": _read_parquet,
     ".zip": _read_zip,
     ".html": lambda path: _ends(path, "</html>"),
     ".svg": lambda path: _ends(path, "</svg>"),
@@ -180,8 +198,11 @@ def files(folder: Path) -> set[str]:
 # --- processes ------------------------------------------------------------------------------------
 
 _IMPORTED = (
-    "torch", "torch._dynamo", "onnx", "rerun", "scipy.optimize", "stable_baselines3", "rich.console", "faulting",
-    "orient_eye.cli.options", "orient_eye.cli.tables", "orient_eye.figures.trajectory", "orient_eye.learning.figures",
+    "torch", "torch._dynamo", "onnx", "pyarrow.parquet", "rerun", "scipy.optimize", "stable_baselines3", "rich.console",
+    "faulting",
+    "orient_eye.cli.options", "orient_eye.cli.tables", "orient_eye.exchange.bids", "orient_eye.exchange.eye_tables",
+    "orient_eye.figures.main_sequence", "orient_eye.figures.trajectory", "orient_eye.learning.compared",
+    "orient_eye.learning.figures",
     "orient_eye.learning.judged", "orient_eye.learning.policy_export", "orient_eye.learning.sequences",
     "orient_eye.learning.torch_policy", "orient_eye.learning.training", "orient_eye.recording",
     "orient_eye.search.evolution", "orient_eye.sysid.comparison", "orient_eye.task.known_weights",

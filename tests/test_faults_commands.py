@@ -324,9 +324,12 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for words in (
         f"predict lpf-1 --target 20 --command {folder}/saccade.csv",
         f"simulate --motor {folder}/saccade.csv --plant lpf --out {folder}/simulated",
+        f"convert lpf-1 --bids {folder}/recorded",
     ):
         ended = Running(words.split(), place).end()
         assert ended.code == 0, ended
+    for path in (folder / "recorded").rglob("*_physio.*"):
+        path.rename(folder / f"gaze{''.join(path.suffixes)}")
     for suffix, name in (("csv", "executed.csv"), ("rrd", "recording.rrd")):
         (folder / "simulated" / f"trajectory.{suffix}").rename(folder / name)
     return folder

@@ -4,6 +4,7 @@ Valid files are spoiled in what they say (a key gone, a cell that is a word, an 
 right again) and in their bytes. A new reader is one line in `READERS`.
 """
 
+import gzip
 import io
 import json
 import math
@@ -27,6 +28,7 @@ from fuzzing import budget
 from orient_eye.cli.saccades import read_pairs
 from orient_eye.commands.motor_file import read_command
 from orient_eye.errors import InputError
+from orient_eye.exchange.eye_tables import read_gaze
 from orient_eye.eyes.elastics import Elastics
 from orient_eye.eyes.model import build_model, motors
 from orient_eye.files import digest
@@ -312,6 +314,50 @@ def use_trajectory(path: Path) -> None:
     assert np.isfinite(move.yaw_deg[~move.failed]).all()
 
 
+def as_parquet(value: Any) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    file = io.BytesIO()
+    try:
+        pq.write_table(pa.table(value), file)
+    except (pa.ArrowException, OverflowError) as error:
+        raise ValueError(str(error)) from error
+    return file.getvalue()
+
+
+def as_gzip(value: Any) -> bytes:
+    return gzip.compress(as_text(value), mtime=0)
+
+
+def gaze_columns() -> dict[str, Any]:
+    time = np.arange(0, 0.2, 0.002)
+    return {"time": time, "x": 10 * np.tanh(100 * (time - 0.1)), "y": 0 * time, "note": 1.0 * (time > 0.1)}
+
+
+def gaze_text(separator: str = ",", header: bool = True) -> str:
+    columns = gaze_columns()
+    rows = [separator.join(f"{cell:.6g}" for cell in row) for row in zip(*columns.values(), strict=True)]
+    return "\n".join([separator.join(columns), *rows] if header else rows) + "\n"
+
+
+def use_gaze(path: Path) -> None:
+    record = read_gaze(path)
+    assert record.time.shape == record.horizontal_deg.shape == record.vertical_deg.shape
+    found = record.saccades()
+    assert (found.duration_s > 0).all()
+
+
+def use_bids(path: Path) -> None:
+    path.with_name("a.json").write_text(json.dumps({"Columns": list(gaze_columns())}), encoding="utf-8")
+    use_gaze(path)
+
+
+def use_sidecar(path: Path) -> None:
+    path.with_name("b.tsv.gz").write_bytes(as_gzip(gaze_text("\t", header=False)))
+    use_gaze(path.with_name("b.tsv.gz"))
+
+
 def use_optimum(path: Path) -> None:
     found = read_optimum(path)
     if found is None:
@@ -379,10 +425,15 @@ READERS = {
     "trajectory": Reader("movement.trajectory", "a.npz", partial(valid, "trajectory"), as_npz, use_trajectory),
     "policy": Reader("learning.policy", "policy.safetensors", partial(valid, "policy"), as_safetensors, use_policy),
     "optimum": Reader("search.optimum_file", "a.safetensors", partial(valid, "optimum"), as_safetensors, use_optimum),
+    "gaze": Reader("exchange.eye_tables", "gaze.csv", gaze_text, as_text, use_gaze),
+    "gaze parquet": Reader("exchange.eye_tables", "gaze.parquet", gaze_columns, as_parquet, use_gaze),
+    "gaze bids": Reader("exchange.eye_tables", "a.tsv.gz", lambda: gaze_text("\t", header=False), as_gzip, use_bids),
+    "sidecar": Reader("exchange.eye_tables", "b.json", lambda: {"Columns": list(gaze_columns())}, as_json, use_sidecar),
     "sb3": Reader("learning.policy_export", "a.zip", sb3_zip, as_zip, lambda p: import_sb3(p, task())),
 }  # fmt: skip
 ELSEWHERE = {
     "tables": "read by all that read a table; tests/test_tables.py",
+    "cli.convert": "run.json; tests/test_exchange.py",
     "cli.check": "tests/test_check.py: the same tables as sysid.recordings",
     "cli.predict": "reads what cli.saccades reads",
     "learning.training": "run.json; tests/test_training.py",

@@ -17,7 +17,7 @@ FLOORS = [
     ["plants"],
     ["task", "statics"],
     ["search"],
-    ["recording"],
+    ["recording", "exchange"],
     ["environments"],
     ["sysid", "learning", "figures", "validation"],
     ["report"],

@@ -11,7 +11,7 @@ from orient_eye.human import human_values, people, studies
 from orient_eye.motor import Motor
 from orient_eye.movement.main_sequence import fit_main_sequence, fit_peak_velocity
 from orient_eye.movement.trajectory import Trajectory
-from orient_eye.movement.velocity_threshold import above, speed_of
+from orient_eye.movement.velocity_threshold import above, bouts, speed_of
 
 STEP = 1e-3
 
@@ -45,6 +45,27 @@ def test_a_half_sine_is_above_the_threshold_as_long_as_its_formula_says(amplitud
     assert bout.duration_s[0] == pytest.approx(wanted, abs=2 * STEP)
     assert bout.acceleration_share[0] == pytest.approx(0.5, abs=STEP / wanted + 1e-3)
     assert bout.peak_velocity_deg_s[0] == pytest.approx(peak, rel=0.01)
+
+
+def test_bouts_of_one_long_recording_are_those_of_its_saccades_alone() -> None:
+    apart = [half_sine(amplitude, 0.03 + 0.002 * amplitude) for amplitude in (5, 10, 20)]
+    speed = np.concatenate([speed_of(each)[0] for each in apart])
+    starts = STEP * np.cumsum([0, *(each.time.size for each in apart[:-1])])
+    found, alone = bouts(STEP * np.arange(speed.size), speed), [above(each) for each in apart]
+    np.testing.assert_allclose(found.onset_s, [b.onset_s[0] + s for b, s in zip(alone, starts, strict=True)], atol=1e-9)
+    for key in ("duration_s", "peak_velocity_deg_s", "acceleration_share"):
+        np.testing.assert_allclose(getattr(found, key), [getattr(b, key)[0] for b in alone], atol=1e-9, err_msg=key)
+
+
+def test_bouts_beside_a_gap_or_an_end_are_not_measured() -> None:
+    fast, slow, gap = [0.0, 60, 60, 0], [0.0] * 3, [np.nan]
+    speed = np.array([60, 0, *fast, *slow, 60, *gap, *fast, *gap, 60, 0, *fast[:-1]])
+    found = bouts(STEP * np.arange(speed.size), speed)
+    assert np.isfinite(found.onset_s).tolist() == [False, True, False, True, False, False]
+    np.testing.assert_allclose(found.onset_s[1], 2.5 * STEP)
+    np.testing.assert_allclose(found.duration_s[1], 2 * STEP)
+    for none in (np.zeros(9), np.full(9, np.nan)):
+        assert bouts(STEP * np.arange(9), none).onset_s.shape == (0,)
 
 
 def test_what_is_slow_or_goes_on_or_failed_has_no_bout_and_leaves_the_others_alone() -> None:

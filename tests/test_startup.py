@@ -10,7 +10,18 @@ import pytest
 
 from orient_eye.cli import COMMANDS
 
-COMPUTING = {"numpy", "scipy", "gymnasium", "mujoco", "numba", "torch", "stable_baselines3", "matplotlib", "rerun"}
+COMPUTING = {
+    "numpy",
+    "scipy",
+    "gymnasium",
+    "mujoco",
+    "numba",
+    "torch",
+    "stable_baselines3",
+    "matplotlib",
+    "rerun",
+    "pyarrow",
+}
 GIVE = """
 import sys
 from orient_eye.cli import main

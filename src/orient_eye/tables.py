@@ -26,9 +26,12 @@ from orient_eye.files import read_bytes, unreadable
 
 Array = NDArray[np.float64]
 _LARGEST_BYTES = 256 * 2**20
+_HINT = "give a text file"
 _MOST_LINES, _LONGEST_LINE = 5_000_000, 100_000
 _LARGEST = 1e20  # of numbers: no measurement comes near, and no square or product of a few overflows
 _SHORTEST_S = 1e-9
+MISSING = frozenset(("", ".", "-", "n/a", "na", "nan", "null", "none"))
+"""What other people's tables write where there is no value, in small letters."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +95,11 @@ def read_lines(path: str | Path) -> list[tuple[int, str]]:
     Raises:
         InputError: it cannot be read, or is larger than any table of ours.
     """
-    hint = "give a text file"
-    content = read_bytes(path, most=_LARGEST_BYTES, hint=hint)
+    return lines_of(path, read_bytes(path, most=_LARGEST_BYTES, hint=_HINT))
+
+
+def lines_of(path: str | Path, content: bytes) -> list[tuple[int, str]]:
+    """The lines of a file with this content; as `read_lines`."""
     try:
         text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
         kept = []
@@ -103,7 +109,7 @@ def read_lines(path: str | Path) -> list[tuple[int, str]]:
             if line.strip(" \n") and not line.lstrip().startswith("#"):
                 kept.append((number, line.removesuffix("\n")))
     except ValueError as error:
-        raise unreadable(path, error, hint) from error
+        raise unreadable(path, error, _HINT) from error
     return kept
 
 
@@ -122,11 +128,17 @@ def read_table(path: str | Path, example: str) -> Table:
 
 def table_of(path: str | Path, lines: list[tuple[int, str]], example: str) -> Table:
     """The table of a file's lines, header first; arguments and errors as `read_table`'s."""
+    header, separator = header_of(path, lines, example)
+    return numbers(path, header, lines[1:], separator)
+
+
+def header_of(path: str | Path, lines: list[tuple[int, str]], example: str) -> tuple[tuple[str, ...], str]:
+    """Names of the columns in the first line, and what stands between cells; arguments and errors as `table_of`'s."""
     if not lines:
         raise InputError(f"{path} is empty; it needs a header ({example}) and rows of numbers below")
     separator = max((",", ";", "\t"), key=lines[0][1].count)
     try:
-        header = [name.strip() for name in next(csv.reader([lines[0][1]], delimiter=separator))]
+        header = tuple(name.strip() for name in next(csv.reader([lines[0][1]], delimiter=separator)))
     except csv.Error as error:
         raise InputError(f"{path} has no header that can be read ({error}); it needs {example}") from error
     if len(set(header)) != len(header):
@@ -135,7 +147,38 @@ def table_of(path: str | Path, lines: list[tuple[int, str]], example: str) -> Ta
         raise InputError(f"{path} begins with numbers; its first line must name the columns: {example}")
     if len(lines) < 2:
         raise InputError(f"{path} has no rows of numbers below its header; the header reads {listed(header)}")
-    return numbers(path, tuple(header), lines[1:], separator)
+    return header, separator
+
+
+def some_columns(
+    path: str | Path, header: tuple[str, ...], lines: list[tuple[int, str]], separator: str, names: Iterable[str]
+) -> Table:
+    """The named columns of lines whose other cells may hold anything; a missing value (`MISSING`) is NaN.
+
+    Raises:
+        InputError: a row of another length, or a cell of these columns that is neither a number nor missing.
+    """
+    places = {name: header.index(name) for name in names}
+    values = array("d")
+    for line, text in lines:
+        cells = next(csv.reader([text], delimiter=separator)) if '"' in text else text.split(separator)
+        _check_length(path, line, cells, header)
+        for name, j in places.items():
+            cell = cells[j].strip()
+            value = math.nan if cell.lower() in MISSING else _number(cell, separator)
+            if value is None:
+                raise InputError(f"{path}, line {line}: {name} is {shown(cell)}, not a number")
+            values.append(value)
+    columns = np.array(values).reshape(-1, len(places)).T
+    return Table(Path(path), dict(zip(places, columns, strict=True)), tuple(line for line, _ in lines))
+
+
+def _check_length(path: str | Path, line: int, cells: list[str], header: tuple[str, ...]) -> None:
+    if len(cells) != len(header):
+        raise InputError(
+            f"{path}, line {line}: {len(cells)} cells, but there are {len(header)} columns "
+            f"({listed(header)}); the file may be cut off there"
+        )
 
 
 def numbers(path: str | Path, header: tuple[str, ...], lines: list[tuple[int, str]], separator: str | None) -> Table:
@@ -147,11 +190,7 @@ def numbers(path: str | Path, header: tuple[str, ...], lines: list[tuple[int, st
     values = array("d")
     for line, text in lines:
         cells = text.split(separator)
-        if len(cells) != len(header):
-            raise InputError(
-                f"{path}, line {line}: {len(cells)} cells, but there are {len(header)} columns "
-                f"({listed(header)}); the file may be cut off there"
-            )
+        _check_length(path, line, cells, header)
         for j, cell in enumerate(cells):
             value = _number(cell, separator) if cell.strip() else math.nan
             if value is None:

@@ -32,6 +32,8 @@ COMMANDS = {
     "check": "orient_eye.cli.check:Check",
     "evaluate": "orient_eye.cli.evaluate:Evaluate",
     "export": "orient_eye.cli.export:Export",
+    "convert": "orient_eye.cli.convert:Convert",
+    "compare": "orient_eye.cli.compare:Compare",
     "optimum": "orient_eye.cli.optimum:Optimum",
     "listing": "orient_eye.cli.listing:Listing",
     "weights": "orient_eye.cli.weights:Weights",

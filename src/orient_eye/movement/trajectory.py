@@ -140,31 +140,41 @@ class Trajectory:
         if (np.abs(np.linalg.norm(self.orientation[~self.failed], axis=-1) - 1) > 0.01).any():
             raise InputError("orientation holds unit quaternions")
 
-    def to_csv(self, path: str | Path) -> Path:
-        """Write a batch of one as a table, one row a sample.
+    def columns(self) -> dict[str, Array]:
+        """The batch as columns of a table, each (saccades, time).
 
-        Columns: t_s; q_w, q_x, q_y, q_z; yaw_deg, pitch_deg, roll_deg; omega_x_deg_s, omega_y_deg_s,
+        Names: t_s; q_w, q_x, q_y, q_z; yaw_deg, pitch_deg, roll_deg; omega_x_deg_s, omega_y_deg_s,
         omega_z_deg_s; tau1_deg ... (motor positions); command_tau1_deg ... (where they were told to be);
         tension_NAME_N ... (where there are tendons).
+        """
+        found = {"t_s": np.broadcast_to(self.time, (len(self), len(self.time)))}
+        found |= {f"q_{part}": self.orientation[..., i] for i, part in enumerate("wxyz")}
+        found |= dict(zip(("yaw_deg", "pitch_deg", "roll_deg"), rotations.to_euler(self.orientation), strict=True))
+        found |= {f"omega_{axis}_deg_s": self.angular_velocity[..., i] for i, axis in enumerate("xyz")}
+        for prefix, values in (("", self.motor), ("command_", self.command)):
+            found |= {f"{prefix}{motor.column}": values[..., i] for i, motor in enumerate(self.motors)}
+        if self.tension is not None:
+            found |= {f"tension_{name}_N": self.tension[..., i] for i, name in enumerate(self.tendon_names)}
+        return found
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write a batch of one as a table of `columns`, one row a sample.
 
         Raises:
             InputError: the batch holds more than one saccade.
         """
         if len(self) != 1:
             raise InputError(f"a CSV holds one saccade, this trajectory has {len(self)}; pick one: trajectory[0]")
-        columns = ["t_s", "q_w", "q_x", "q_y", "q_z", "yaw_deg", "pitch_deg", "roll_deg"]
-        columns += [f"omega_{axis}_deg_s" for axis in "xyz"]
-        columns += [f"{prefix}{motor.column}" for prefix in ("", "command_") for motor in self.motors]
-        euler = [angle[0] for angle in rotations.to_euler(self.orientation)]
-        data = [self.time, *self.orientation[0].T, *euler, *self.angular_velocity[0].T, *self.motor[0].T]
-        data += [*self.command[0].T]
-        if self.tension is not None:
-            columns += [f"tension_{name}_N" for name in self.tendon_names]
-            data += [*self.tension[0].T]
+        columns = {name: values[0] for name, values in self.columns().items()}
         return write_atomically(
             path,
             lambda temporary: np.savetxt(
-                temporary, np.column_stack(data), fmt="%.9g", delimiter=",", header=",".join(columns), comments=""
+                temporary,
+                np.column_stack(list(columns.values())),
+                fmt="%.9g",
+                delimiter=",",
+                header=",".join(columns),
+                comments="",
             ),
         )
 

@@ -2,6 +2,7 @@
 
     bout = above(trajectory)                         # 30 deg/s
     bout.duration_s, bout.acceleration_share
+    bouts(time, speed)                               # all of one long recording
 
 The thesis' duration (`measures.settling_time_s`) ends where the eye stays within a band around its end, which is
 later: the numbers of people and ours can be compared only where both are measured alike.
@@ -82,3 +83,31 @@ def above(trajectory: Trajectory, threshold_deg_s: float = THRESHOLD_DEG_S, of: 
     found = np.where(known, np.stack([onset, offset, speed[rows, top], time[top]]), np.nan)
     onset, offset, peak, at = found
     return Bout(onset, offset, peak, (at - onset) / np.where(offset > onset, offset - onset, np.nan))
+
+
+def bouts(time: Array, speed: Array, threshold_deg_s: float = THRESHOLD_DEG_S) -> Bout:
+    """All parts of one recording that are faster than a threshold, in their order; every field is (bouts,).
+
+    NaN where one begins or ends in a gap, or with the recording. Times are interpolated between samples.
+
+    Args:
+        time: [s], (samples,).
+        speed: [deg/s], (samples,), NaN in gaps.
+        threshold_deg_s: speed.
+    """
+    edges = np.diff((speed >= threshold_deg_s).astype(int), prepend=0, append=0)
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    around = np.concatenate([[np.nan], speed, [np.nan]])
+    moments = np.concatenate([time[:1], time, time[-1:]])
+
+    def crossing(slow: NDArray[np.intp], fast: NDArray[np.intp]) -> Array:
+        """NaN beside a gap; both count from `around`."""
+        share = (threshold_deg_s - around[slow]) / (around[fast] - around[slow])
+        return np.asarray(moments[slow] + share * (moments[fast] - moments[slow]))
+
+    onset, offset = crossing(first, first + 1), crossing(last + 2, last + 1)
+    top = np.array([i + int(speed[i : j + 1].argmax()) for i, j in zip(first, last, strict=True)], int)
+    whole = np.isfinite(onset) & np.isfinite(offset)
+    found = np.where(whole, np.stack([onset, offset, speed[top], time[top]]), np.nan)
+    onset, offset, peak, at = found
+    return Bout(onset, offset, peak, (at - onset) / (offset - onset))
