@@ -41,6 +41,8 @@ class Line:
     """Writes a run directory, which has to be new or empty."""
     slow: bool = False
     """Tried only where each fault is tried more than once."""
+    goes_on: bool = False
+    """Takes up what is in its folder when it is called again."""
     resumes: bool = False
     """What interrupts it is tried elsewhere, and how it goes on (`tests/test_checkpoint.py`)."""
 
@@ -110,6 +112,11 @@ LINES = {
         f"train {_SHORT}",
         "result.json", "metrics.csv", "policy.safetensors", "optimum.safetensors", "recording.rrd", "policy.png",
         "learning.png", slow=True, resumes=True,
+    ),
+    "sweep": Line(
+        f"sweep {_SHORT} --seed 0 1 --jobs 2 --out {{out}}",
+        ("sweep.json", "result.json", "sweep.png", *(f"seed{k}/policy.safetensors" for k in (0, 1))),
+        whole_run=True, slow=True, resumes=True, goes_on=True,
     ),
 }  # fmt: skip
 """A new command is one line: its words, and the files that it leaves."""

@@ -1,4 +1,4 @@
-"""The progress bar of everything that takes long.
+"""The progress bar of everything that takes long, and the live picture of what is more than a bar.
 
     with progress_bar("searching the optimum", quiet=quiet) as advance:
         searched_optimum(task, start, target, progress=advance)
@@ -6,11 +6,12 @@
 Bars that follow one another stand in blocks of their own.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from rich.console import Console
+from rich.console import Console, RenderableType
+from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 
@@ -42,3 +43,17 @@ def progress_bar(words: str, *, quiet: bool = False) -> Iterator[Advance]:
             bar.update(job, completed=share, note=note)
 
         yield advance
+
+
+@contextmanager
+def live(*, quiet: bool = False) -> Iterator[Callable[[RenderableType], None] | None]:
+    """What shows a table on standard error, in place of the one before, until the block ends.
+
+    None where that is no terminal, or if quiet.
+    """
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield None
+        return
+    with Live(console=console, transient=True, auto_refresh=False) as screen:
+        yield lambda what: screen.update(what, refresh=True)

@@ -1,7 +1,8 @@
 """Where the files that travel with the code are: the MJCF, its meshes, the shipped models.
 
 They stand at the top of a checkout (`eye_mjcf/`, `models/`) and inside the package in a wheel
-(`orient_eye/_data/`). Everything that opens one of them asks here.
+(`orient_eye/_data/`). Everything that opens one of them asks here, and
+everything that uses all cores how many it has.
 """
 
 import os
@@ -13,6 +14,7 @@ from tempfile import TemporaryDirectory
 from orient_eye.errors import InputError
 
 _PACKAGE = Path(__file__).resolve().parent
+_SHARE: list[int] = []
 
 
 def data_folder(name: str) -> Path:
@@ -43,6 +45,16 @@ def shipped_or_given(name: str | Path, shipped: Mapping[str, Path], kind: str, h
     if not os.path.exists(file):  # of a name that no file can have, too
         raise InputError(f"{printable(name)} is no {kind}: there is no such file; {hint}")
     return file
+
+
+def cores() -> int:
+    """How many threads "one a core" are: the machine's cores, or what `share_cores` left this process of them."""
+    return _SHARE[-1] if _SHARE else os.cpu_count() or 1
+
+
+def share_cores(count: int) -> None:
+    """Leave this process so many cores, because others work beside it; plants made before keep theirs."""
+    _SHARE[:] = [count]
 
 
 def user_cache(name: str) -> Path:

@@ -27,6 +27,7 @@ COMMANDS = {
     "view": "orient_eye.cli.view:View",
     "sysid": "orient_eye.cli.sysid:Sysid",
     "train": "orient_eye.cli.train:Train",
+    "sweep": "orient_eye.cli.sweep:Sweep",
     "models": "orient_eye.cli.models:Models",
     "predict": "orient_eye.cli.predict:Predict",
     "check": "orient_eye.cli.check:Check",

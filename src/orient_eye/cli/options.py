@@ -5,12 +5,16 @@ A field of a command named `plant`, `case`, `targets` or `pulse` takes the names
 
     command = parse(Simulate, ["--motor", "x.csv", "--plant", "mujoco", "--accurate"], program="orient-eye simulate")
     command.plant_options                            # {"accurate": True}
+
+A field that is annotated with `Several(config)` takes the options of that dataclass, each with several values; what is
+given of them is its value, by name: {"case": ("1", "2-fixed"), "seed": (0, 1, 2)}.
 """
 
 import inspect
 import operator
 from collections.abc import Iterator, Sequence
-from dataclasses import Field, field, fields, is_dataclass, make_dataclass
+from dataclasses import Field, dataclass, field, fields, is_dataclass, make_dataclass
+from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import tyro
@@ -28,7 +32,19 @@ REGISTRIES: dict[str, Registry[Any]] = {"plant": PLANTS, "case": CASES, "targets
 """Field of a command to where its names stand."""
 _RIG = "rig"
 """The option of a plant that also says something of a policy's own plant, and that a command may have as its own."""
+_SERIES = "series"
+"""Marks an option that takes several values in place of one."""
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone)
+
+
+@dataclass(frozen=True)
+class Several:
+    """Annotates a field that takes the options of a dataclass, each with several values.
+
+    One of several numbers, as weights, has one value.
+    """
+
+    of: Any
 
 
 def parse(command: type[T], arguments: Sequence[str], program: str | None = None) -> T:
@@ -54,7 +70,10 @@ def offered(command: type[T], taken: frozenset[str] = frozenset()) -> type[T]:
     own: list[tuple[str, Any, Any]] = []
     taken |= {each.name for each in fields(command)}  # type: ignore[arg-type]  # a dataclass by contract
     for each, hint in _hints(command):
-        if each.name == "plant_options":
+        several = _several(hint)
+        if several is not None:
+            inner, name = in_series(offered(several.of, taken)), ""
+        elif each.name == "plant_options":
             inner, name = _plant_options(taken), "plant"
         elif isinstance(hint, type) and is_dataclass(hint):
             inner, name = offered(hint, taken), ""
@@ -66,6 +85,35 @@ def offered(command: type[T], taken: frozenset[str] = frozenset()) -> type[T]:
         own.append((each.name, _annotated(inner, tyro.conf.arg(name=name)), field(default_factory=inner)))
     words = {"__doc__": command.__doc__}
     return make_dataclass(command.__name__, own, bases=(command,), frozen=True, namespace=words)
+
+
+def _several(hint: Any) -> Several | None:
+    extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    return next((extra for extra in extras if isinstance(extra, Several)), None)
+
+
+def in_series(made: Any) -> Any:
+    """The dataclass that `offered` made, with several values for each field that has one; None where none is given."""
+    own: list[tuple[str, Any, Any]] = []
+    for each, hint in _hints(made):
+        inner, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+        parts = get_args(inner) if get_origin(inner) in (Union, UnionType) else (inner,)
+        parts = tuple(part for part in parts if part is not NoneType)
+        if is_dataclass(inner):
+            kind = in_series(inner)
+            own.append((each.name, _annotated(kind, *extras), field(default_factory=kind)))
+        elif inner is bool:
+            own.append((each.name, hint, field(default=each.default)))
+        else:
+            if not any(get_origin(part) in (tuple, dict) for part in parts):
+                values: Any = (operator.getitem(Union, parts), ...)
+                parts = (tuple.__class_getitem__(values),)
+                extras.append(_SERIES)
+            if each.default is not None:
+                extras.append(tyro.conf.arg(help_behavior_hint=f"(default: {each.default})"))
+            several = operator.getitem(Union, (*parts, None))
+            own.append((each.name, _annotated(several, *extras) if extras else several, field(default=None)))
+    return make_dataclass(made.__name__, own, bases=(made,), frozen=True, namespace={"__doc__": made.__doc__})
 
 
 def _hints(command: Any) -> Iterator[tuple["Field[Any]", Any]]:
@@ -149,12 +197,26 @@ def _as_written(command: type[T], parsed: Any) -> T:
     values: dict[str, Any] = {}
     for each, hint in _hints(command):
         value = getattr(parsed, each.name)
-        if each.name == "plant_options":
+        if _several(hint) is not None:
+            value = values_of(value)
+        elif each.name == "plant_options":
             value = _given(parsed.plant, value)
         elif isinstance(hint, type) and is_dataclass(hint):
             value = _as_written(hint, value)
         values[each.name] = value
     return command(**values)
+
+
+def values_of(parsed: Any) -> dict[str, tuple[Any, ...]]:
+    """Of each option that was given its values, from a dataclass that `in_series` made."""
+    found: dict[str, tuple[Any, ...]] = {}
+    for each, hint in _hints(type(parsed)):
+        value = getattr(parsed, each.name)
+        if is_dataclass(value):
+            found |= values_of(value)
+        elif value is not None and value is not each.default:
+            found[each.name] = value if _SERIES in get_args(hint)[1:] else (value,)
+    return found
 
 
 def _given(plant: str | None, parsed: Any) -> dict[str, Any]:

@@ -58,9 +58,9 @@ class Interrupted(Exception):
         code: with which a program ends after that signal.
     """
 
-    def __init__(self, folder: Path, signal: int) -> None:
+    def __init__(self, folder: Path, signal: int, command: str = "train") -> None:
         self.folder, self.code = folder, 128 + signal
-        super().__init__(f"stopped; go on with: orient-eye train --resume {shlex.quote(str(folder))}")
+        super().__init__(f"stopped; go on with: orient-eye {command} --resume {shlex.quote(str(folder))}")
 
 
 Begun = Callable[[SaccadeTask], object]
@@ -91,18 +91,28 @@ def train(
         InputError: bad configuration, or the directory is taken, or cannot be written.
         Interrupted: Ctrl-C, or a signal to end.
     """
-    _check_interval(checkpoint_s)
-    task = config.make_task()  # before the directory: bad input leaves nothing behind
-    settings = config.resolved(task)
-    _origin(settings, task)
+    check_interval(checkpoint_s)
+    task, settings = prepared(config)  # before the directory: bad input leaves nothing behind
     out = out or Path("runs") / f"train-{datetime.now():%Y%m%d-%H%M%S}"
     with explained(out):
         out.mkdir(parents=True, exist_ok=True)
-    with _alone(out):
+    with alone(out):
         run = RunDirectory.create(out, "train", settings, seed=settings.seed)
         if begun is not None:
             begun(task)
         return _Run(settings, task, run, checkpoint_s, quiet).execute(resume=False)
+
+
+def prepared(config: TrainConfig) -> tuple[SaccadeTask, TrainSettings]:
+    """The task and the settings of a run, all that can be wrong with them found.
+
+    Raises:
+        InputError: as `train`, of the configuration.
+    """
+    task = config.make_task()
+    settings = config.resolved(task)
+    _origin(settings, task)
+    return task, settings
 
 
 def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOINT_S) -> dict[str, Any]:
@@ -115,8 +125,8 @@ def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOIN
         InputError: no run, nothing to go on from, or it is trained already, by another process.
         Interrupted: Ctrl-C, or a signal to end.
     """
-    _check_interval(checkpoint_s)
-    with _alone(folder):
+    check_interval(checkpoint_s)
+    with alone(folder):
         run = RunDirectory(folder)
         description = run.read_json("run.json")
         command = description.get("command") if isinstance(description, dict) else None
@@ -140,7 +150,7 @@ def resume(folder: Path, *, quiet: bool = False, checkpoint_s: float = CHECKPOIN
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
+def alone(folder: Path) -> Iterator[None]:
     """Keep other trainings out of a folder, until the block ends, or this process however it does.
 
     Raises:
@@ -171,7 +181,8 @@ def _origin(settings: TrainSettings, task: SaccadeTask) -> Policy | None:
     return policy.within(task, np.random.default_rng(settings.seed))
 
 
-def _check_interval(checkpoint_s: float) -> None:
+def check_interval(checkpoint_s: float) -> None:
+    """Raises InputError where that is no time between checkpoints."""
     real("the time between checkpoints", checkpoint_s, 0.01, 1e6, unit="s")
 
 

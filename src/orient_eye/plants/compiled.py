@@ -1,6 +1,5 @@
 """What the plants on the compiled kernel have in common: its eye, its torques and its threads."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
@@ -16,6 +15,7 @@ from orient_eye.eyes.elastics import Elastics
 from orient_eye.eyes.model import STANDARD_GRAVITY
 from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.limits import Limits
+from orient_eye.resources import cores
 from orient_eye.rig import Rig
 from orient_eye.rotations import rotation
 
@@ -114,7 +114,7 @@ class CompiledPlant(ElasticPlant):
 
     def _in_slices(self, saccades: int, torques: int, move: Callable[[slice], None]) -> None:
         """Move saccades, by slices in as many threads as that many torques are worth."""
-        threads = min(self.threads or os.cpu_count() or 1, torques // _WORTH_A_THREAD)
+        threads = min(self.threads or cores(), torques // _WORTH_A_THREAD)
         if threads < 2:
             move(slice(None))
             return

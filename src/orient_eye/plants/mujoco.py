@@ -31,6 +31,7 @@ from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.limits import Limits
 from orient_eye.plants.simulated import Run
 from orient_eye.plants.tavares import TavaresPlant
+from orient_eye.resources import cores
 from orient_eye.rig import Rig
 from orient_eye.rotations import rotation
 from orient_eye.state import State
@@ -91,7 +92,7 @@ class MujocoPlant(ElasticPlant):
         self._sensed_velocity = self._sensed("angular_velocity")
         lengths = [self._sensed(f"length_{name}") for name in self.tendons]
         self._sensed_length = np.array([place.start for place in lengths])
-        self._pool, self._empty = _Pool(self.model, self.threads), mujoco.MjData(self.model)
+        self._pool, self._empty = _Pool(self.model, self.threads or cores()), mujoco.MjData(self.model)
         self._fit_to_limits()
 
     def _sensed(self, name: str) -> slice:
