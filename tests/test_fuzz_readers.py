@@ -437,6 +437,9 @@ ELSEWHERE = {
     "cli.check": "tests/test_check.py: the same tables as sysid.recordings",
     "cli.predict": "reads what cli.saccades reads",
     "learning.training": "run.json; tests/test_training.py",
+    "learning.sweep": "sweep.json and result.json; tests/test_sweep.py",
+    "learning.workers": "what workers tell each other; tests/test_sweep.py",
+    "cli.sweep": "a sweep's TOML; tests/test_sweep.py",
     "learning.checkpoint": "tests/test_checkpoint.py",
     "files": "the readers below all others",
     "report.evidence": "shipped studies, and metrics.csv by read_table",
@@ -449,6 +452,7 @@ OF_OURS = {
     "human.py": "shipped data",
     "report/page.py": "the template of the page",
     "learning/figures/page.py": "the metrics of a run, while it is made",
+    "learning/sweep.py": "the same",
 }
 """Who opens a file by himself, and why."""
 

@@ -26,7 +26,8 @@ class Motor:
         working: where a policy may send it, inside the range.
         speed_limit: largest speed [unit/s]; None for none.
         acceleration_limit: largest acceleration [unit/s^2]; None for none.
-        rest: where it stands when the eye looks straight ahead at ease: 0, or its pretension.
+        rest: where it stands when the eye looks straight ahead at ease: 0, or what is nearest to it in the range; or
+            its pretension.
 
     Raises:
         InputError: a range or limit that is none, or a rest outside the range.
@@ -46,6 +47,8 @@ class Motor:
         if any(math.isnan(end) for end in (*self.range, *self.working)) or not (low < high and inside[0] < inside[1]):
             raise InputError(f"motor {self.name!r}: a range goes from low to high, got {self.range}, {self.working}")
         object.__setattr__(self, "working", inside)
+        if self.rest == 0:  # nobody has said more
+            object.__setattr__(self, "rest", min(max(0.0, low), high))
         if not low <= self.rest <= high:
             raise InputError(f"motor {self.name!r} rests inside its range {low:g} to {high:g}, got {self.rest:g}")
         for limit in (self.speed_limit, self.acceleration_limit):
