@@ -20,6 +20,7 @@ from orient_eye.plants.cables import Cables
 from orient_eye.plants.fixation import Fixations
 from orient_eye.plants.limits import Limits, are_limited, limited, limits_of, travel_s
 from orient_eye.plants.simulated import SimulatedPlant
+from orient_eye.plants.turns import turned
 from orient_eye.rig import Rig
 from orient_eye.rotations import FORWARD, gaze, rotation
 
@@ -160,9 +161,8 @@ class ElasticPlant(SimulatedPlant):
     def motor_rates(self) -> Array:
         """See `orient_eye.plants.Plant`."""
         poles, ways = self._modes
-        moved = self.rest(rests(self.motors) + np.eye(len(self.motors) + 1, len(self.motors), -1))
-        turned = (rotation(moved[1:]) * rotation(moved[0]).inv()).as_rotvec().T
-        parts = np.linalg.solve(ways, np.concatenate([turned, np.zeros_like(turned)]))
+        turn = turned(self).as_rotvec().T
+        parts = np.linalg.solve(ways, np.concatenate([turn, np.zeros_like(turn)]))
         shares = np.linalg.norm(ways[:3], axis=0)[:, None] * np.abs(parts)
         return np.array([float(f"{rate:.4g}") for rate in np.abs(poles)[shares.argmax(axis=0)]])
 

@@ -30,10 +30,10 @@ from orient_eye.commands import Command
 from orient_eye.commands.generators import Generators
 from orient_eye.commands.pulses import PULSES
 from orient_eye.errors import InputError
-from orient_eye.motor import rests
 from orient_eye.plants import Plant, PulseRates
 from orient_eye.plants.cables import muscles_of
 from orient_eye.plants.fixation import Fixations, Rule
+from orient_eye.plants.turns import turned
 from orient_eye.state import State
 from orient_eye.task.actions import ActionSpace, Number, PulseStepActions
 
@@ -216,12 +216,13 @@ class GeneratorRatios(GeneratorActions):
     def _usual_k0(self, ends: tuple[Array, Array]) -> Array:
         """From directions of start and target, (saccades, generators)."""
         plant, fixations = self.each.plant, self.fixations
-        known = [plant.turning_rates(fixations.orientation(end), fixations.motor(end)) for end in ends]
-        if self.generators != "directions" or known[0] is None or known[1] is None:
-            at_rest = np.log(plant.motor_rates())
-            return OF_POLE * np.exp([[at_rest[some].mean() for some in self.members]])
-        start, target = (np.maximum(each[:, [2, 1]], 1e-3) for each in known if each is not None)
-        return np.asarray(OF_RATE * start**AT_START * target ** (1 - AT_START))
+        if self.generators == "directions":
+            rates = (plant.turning_rates(fixations.orientation(end), fixations.motor(end)) for end in ends)
+            known = [np.maximum(each[:, [2, 1]], 1e-3) for each in rates if each is not None]
+            if len(known) == len(ends):
+                return np.asarray(OF_RATE * known[0] ** AT_START * known[1] ** (1 - AT_START))
+        at_rest = np.log(plant.motor_rates())
+        return OF_POLE * np.exp([[at_rest[some].mean() for some in self.members]])
 
     def command(self, start: State, target: Array, action: Array) -> Command:
         """The motors' command."""
@@ -242,10 +243,7 @@ def _members(plant: Plant, index: Sequence[int], generators: Kind) -> list[list[
                 f"the motors of plant {plant.name!r} are not pairs of antagonists; take generators for axes"
             )
         return [list(pair) for pair in muscles.pairs.tolist()]
-    count = len(plant.motors)
-    at = plant.rest(rests(plant.motors) + np.eye(count + 1, count, -1))
-    turn = (rotations.rotation(at[1:]) * rotations.rotation(at[0]).inv()).as_rotvec()
-    sideways = np.abs(turn).argmax(axis=1) == _SIDEWAYS
+    sideways = np.abs(turned(plant).as_rotvec()).argmax(axis=1) == _SIDEWAYS
     kinds = [[i for i in index if sideways[i] == kind] for kind in (True, False)]
     if not all(kinds):
         raise InputError(f"no motors of plant {plant.name!r} turn the eye sideways, or no others; take other actions")

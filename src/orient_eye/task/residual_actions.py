@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from orient_eye import rotations
 from orient_eye.commands import Command
-from orient_eye.motor import rests
 from orient_eye.plants import Plant, PulseRates
 from orient_eye.plants.fixation import Fixations, Rule
+from orient_eye.plants.turns import turned
 from orient_eye.state import State
 from orient_eye.task.actions import ActionSpace, Number, PulseStepActions
 
@@ -65,11 +65,9 @@ class ResidualActions(ActionSpace):
         known = plant.motor_rates()[self._plain.index]
         low, high = np.array([(k0.low, k0.high) for k0 in numbers[:, 2]]).T
         self._k0 = np.clip(np.where(np.isfinite(known), known, np.sqrt(low * high)), low, high)
-        at = plant.rest(rests(plant.motors) + np.eye(len(plant.motors) + 1, len(plant.motors), -1))
-        turned = (rotations.rotation(at[1:]) * rotations.rotation(at[0]).inv()).as_rotvec(degrees=True)
-        turned = np.abs(turned[self._plain.index])
-        rivals = np.bincount(turned.argmax(axis=1), minlength=3)[turned.argmax(axis=1)]
-        reach = [float(f"{shift:.6g}") for shift in _TURN_DEG * rivals / turned.max(axis=1)]  # on any machine
+        turn = np.abs(turned(plant).as_rotvec(degrees=True)[self._plain.index])
+        rivals = np.bincount(turn.argmax(axis=1), minlength=3)[turn.argmax(axis=1)]
+        reach = [float(f"{shift:.6g}") for shift in _TURN_DEG * rivals / turn.max(axis=1)]  # on any machine
         self.numbers = tuple(
             number
             for (_, D, _), shift in zip(numbers, reach, strict=True)

@@ -22,6 +22,7 @@ from orient_eye.errors import InputError
 from orient_eye.motor import check_driven, names, redundant, rests
 from orient_eye.movement.measures import View
 from orient_eye.plants import Plant, PulseRates
+from orient_eye.plants.turns import turned
 from orient_eye.state import State, unit
 from orient_eye.task.target_sets import TARGETS
 
@@ -235,10 +236,7 @@ class AxisTargets:
 
 def _effect(plant: Plant) -> Array:
     """Yaw, pitch and roll [deg] (motors, 3) by which a degree of each motor turns the eye from where it rests."""
-    count = len(plant.motors)
-    at = plant.rest(rests(plant.motors) + np.eye(count + 1, count, -1))
-    turn = rotations.rotation(at[1:]) * rotations.rotation(at[0]).inv()
-    return np.stack(rotations.to_euler(turn.as_quat(scalar_first=True)), axis=-1)
+    return np.stack(rotations.to_euler(turned(plant).as_quat(scalar_first=True)), axis=-1)
 
 
 def _turning(plant: Plant, axis: str) -> tuple[str, ...]:

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from orient_eye.figures import OTHER, tidy
-from orient_eye.figures.gaze.human import draw_human, draw_human_duration
+from orient_eye.figures import OTHER
+from orient_eye.figures.gaze.human import beside_people
 from orient_eye.figures.gaze.style import HORIZONTAL, VERTICAL, axial
 from orient_eye.human import human_values, people
 from orient_eye.listing import fit_plane
@@ -79,16 +79,7 @@ def main_sequence_beside_group(
         if fit is not None:
             peak.plot(size, fit.peak_velocity(size), color=colour, lw=1.2)
             duration.plot(size, fit.duration_ms(size), color=colour, lw=1.2)
-    draw_human(peak, "peak_velocity", "peak_velocity_vertical")
-    draw_human(duration, "duration")
-    draw_human_duration(duration, largest)
-    peak.set(ylabel="peak velocity of the gaze [deg/s]")
-    duration.set(ylabel="duration [ms]")
-    for axes in (peak, duration):
-        axes.set(xlabel="amplitude [deg]", xlim=(0, 1.04 * largest))
-        axes.set_ylim(bottom=0)
-        axes.legend(frameon=False, fontsize="small", ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
-        tidy(axes)
+    beside_people(peak, duration, largest)
     rows = {name: _fitted(fit) for name, (fit, _) in ours.items()}
     rows |= {
         _GROUP: [_told(GROUP.V0), _told(GROUP.c), _told(GROUP.D0_ms), _told(GROUP.d_ms, 1)],

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from orient_eye.figures import tidy
 from orient_eye.figures.gaze.style import HUMAN
 from orient_eye.human import human_values, studies
 
@@ -33,3 +34,17 @@ def draw_human_duration(axes: "Axes", largest_deg: float) -> None:
     size = np.array([0, largest_deg])
     label = f"people: {intercept.value:g} ms + {slope.value:g} ms/deg ({slope.study})"
     axes.plot(size, intercept.value + slope.value * size, ":", color=HUMAN, label=label)
+
+
+def beside_people(peak: "Axes", duration: "Axes", largest_deg: float) -> None:
+    """People's values into a main sequence of the gaze, and its axes, up to an amplitude [deg]."""
+    draw_human(peak, "peak_velocity", "peak_velocity_vertical")
+    draw_human(duration, "duration")
+    draw_human_duration(duration, largest_deg)
+    peak.set(ylabel="peak velocity of the gaze [deg/s]")
+    duration.set(ylabel="duration [ms]")
+    for axes in (peak, duration):
+        axes.set(xlabel="amplitude [deg]", xlim=(0, 1.04 * largest_deg))
+        axes.set_ylim(bottom=0)
+        axes.legend(frameon=False, fontsize="small", ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+        tidy(axes)

@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from orient_eye.figures import tidy
-from orient_eye.figures.gaze.human import draw_human, draw_human_duration
+from orient_eye.figures.gaze.human import beside_people
 from orient_eye.figures.gaze.style import HORIZONTAL, OBLIQUE, VERTICAL, axial
 from orient_eye.movement.main_sequence import fit_peak_velocity
 from orient_eye.movement.measures import Measures
@@ -50,16 +49,7 @@ def main_sequence(trajectory: Trajectory, measures: Measures) -> Figure:
         some = measures[chosen & usable]
         _draw_peak(peak, some, name, style)
         _draw_duration(duration, some, name, style)
-    draw_human(peak, "peak_velocity", "peak_velocity_vertical")
-    draw_human(duration, "duration")
-    draw_human_duration(duration, largest)
-    peak.set(ylabel="peak velocity of the gaze [deg/s]")
-    duration.set(ylabel="duration [ms]")
-    for axes in (peak, duration):
-        axes.set(xlabel="amplitude [deg]", xlim=(0, 1.04 * largest))
-        axes.set_ylim(bottom=0)
-        axes.legend(frameon=False, fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
-        tidy(axes)
+    beside_people(peak, duration, largest)
     figure.suptitle("Main sequence by direction")
     return figure
 
