@@ -25,6 +25,7 @@ import numpy as np
 import tyro
 
 from orient_eye.files import write_text
+from orient_eye.learning.card import write_card
 from orient_eye.learning.evaluation import (
     Yardstick,
     amplitude_table,
@@ -92,8 +93,10 @@ def ship(options: Results) -> None:
         pairs, rows = (each.bettered(policy.act) for each in searched)
         found = {**gap_summary(pairs, *pairs.perform(policy.act)), "table": amplitude_table(rows, policy.act)}
         told = {**policy.manifest, "result": {**policy.manifest["result"], **found}}
-        goal = replace(policy, manifest=told).save(ROOT / "models" / "policies" / name).parent
+        policy = replace(policy, manifest=told)
+        goal = policy.save(ROOT / "models" / "policies" / name).parent
         carry_optimum(pairs, rows, goal)
+        write_card(policy, goal, shipped=True)
         shutil.copy(run / "metrics.csv", goal)
         print(f"{goal}: from {run.name}, gap {found['gap_mean']:.4f}", file=sys.stderr)
 

@@ -4,8 +4,8 @@
     python scripts/results.py runs/results
 
 What is learned on `tavares` is judged on `mujoco`. With --write the tables go into the documents, and with --ship the
-best run of each case into models/policies. The searched optimum travels with a shipped policy; --optimum fills in what
-is missing or no longer true.
+best run of each case into models/policies. The searched optimum and the card travel with a shipped policy; --optimum
+fills in what is missing or no longer true, and --cards writes the cards anew.
 """
 
 import shutil
@@ -19,6 +19,7 @@ import numpy as np
 import tyro
 
 from orient_eye.files import read_json, write_text
+from orient_eye.learning.card import write_card
 from orient_eye.learning.evaluation import carry_optimum, evaluation_saccades
 from orient_eye.learning.policy import Policy, shipped_policies
 from orient_eye.report.evidence import COURSE
@@ -33,21 +34,26 @@ BEGIN, END = "<!-- scripts/results.py -->", "<!-- end -->"
 class Results:
     """Print the tables of a sweep."""
 
-    folder: Annotated[Path, tyro.conf.Positional]
+    folder: Annotated[Path, tyro.conf.Positional] = Path("runs/results")
     """Folder of the sweep."""
     write: bool = False
     """Put the tables into README.md and docs/learning.md."""
     ship: bool = False
     """Copy the best run of each case into models/policies."""
     optimum: bool = False
-    """Train nothing: put the searched optimum beside every shipped policy."""
+    """Read no sweep: put the searched optimum beside every shipped policy."""
+    cards: bool = False
+    """Read no sweep: write the card of every shipped policy."""
 
 
 def main(options: Results) -> None:
     """Judge what is not judged, then print."""
-    if options.optimum:
+    if options.optimum or options.cards:
         for name, folder in shipped_policies().items():
-            print(f"models/policies/{name}: {carry(folder)}", file=sys.stderr)
+            if options.optimum:
+                print(f"models/policies/{name}: {carry(folder)}", file=sys.stderr)
+            if options.cards:
+                print(write_card(Policy.load(folder), folder, shipped=True).relative_to(ROOT), file=sys.stderr)
         return
     judge(options.folder)
     tables = {"README.md": short_table(options.folder), "docs/learning.md": table(options.folder)}
@@ -145,6 +151,7 @@ def ship(folder: Path) -> None:
         for name in (NAME, COURSE):
             shutil.copy(best / name, goal / name)
         carry(goal)
+        write_card(policy, goal, shipped=True)
         print(f"models/policies/{plant}-{case}: from {best.name}", file=sys.stderr)
 
 

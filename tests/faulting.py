@@ -111,7 +111,7 @@ LINES = {
     "train": _run(
         f"train {_SHORT}",
         "result.json", "metrics.csv", "policy.safetensors", "optimum.safetensors", "recording.rrd", "policy.png",
-        "learning.png", slow=True, resumes=True,
+        "learning.png", "README.md", slow=True, resumes=True,
     ),
     "sweep": Line(
         f"sweep {_SHORT} --seed 0 1 --jobs 2 --out {{out}}",
@@ -179,6 +179,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     ".parquet": _read_parquet,
     ".zip": _read_zip,
     ".html": lambda path: _ends(path, "</html>"),
+    ".md": lambda path: _ends(path, "card."),
     ".svg": lambda path: _ends(path, "</svg>"),
     ".onnx": _read_onnx,
     ".safetensors": _read_safetensors,

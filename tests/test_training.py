@@ -68,6 +68,7 @@ def test_a_run_explains_itself(tiny: Path) -> None:
     assert "thesis 4.4.5" in where.pop()
     for name in (
         "policy.safetensors",
+        "README.md",
         "metrics.csv",
         "learning.png",
         "policy.png",

@@ -30,6 +30,7 @@ SHIPPED = {
     "eye_mjcf/meshes/sclera.stl",
     "models/weights.json",
     "models/policies/lpf-1/policy.safetensors",
+    "models/policies/lpf-1/README.md",
     "models/policies/mujoco-1/policy.safetensors",
     "models/rigs/prototype.toml",
     "models/surrogates/thesis.json",

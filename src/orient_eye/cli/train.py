@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class Train:
     """Train a saccade policy with Soft Actor-Critic, on the surrogate or on the whole eye.
 
-    Leaves a run directory: configuration, metrics, policy, pictures, and a Rerun recording of evaluation
+    Leaves a run directory: configuration, metrics, policy and its card, pictures, and a Rerun recording of evaluation
     saccades at several stages. Ctrl-C stops cleanly; --resume goes on. It ends with a table of learned
     actions beside the best ones a search finds.
 
@@ -62,7 +62,7 @@ class Train:
         say_result(result)
         if "robust" in result:
             _say_robust(result)
-        say(f"in {result['out']}: policy.png, learning.png, recording.rrd")
+        say(f"in {result['out']}: README.md (the policy's card), policy.png, learning.png, recording.rrd")
         say(f"look at the saccades: orient-eye view {result['out']}/recording.rrd")
         return result
 

@@ -4,7 +4,7 @@
 
 The run directory holds run.json (settings, seed, versions), metrics.csv, optimum.safetensors (the searched optimum),
 stages/ (evaluation saccades at several stages), checkpoint.safetensors and the one before it, policy.safetensors,
-result.json, learning.png, policy.png and recording.rrd. One training at a time works in it.
+README.md (its card), result.json, learning.png, policy.png and recording.rrd. One training at a time works in it.
 """
 
 import copy
@@ -28,6 +28,7 @@ from orient_eye.checks import real
 from orient_eye.environments.sb3_env import SaccadeVecEnv
 from orient_eye.errors import Ended, InputError
 from orient_eye.files import explained, remove_leftovers, unreadable
+from orient_eye.learning.card import write_card
 from orient_eye.learning.checkpoint import NAME as CHECKPOINT
 from orient_eye.learning.checkpoint import PREVIOUS, Found, load_checkpoint
 from orient_eye.learning.config import TrainConfig, TrainSettings
@@ -327,7 +328,9 @@ class _Run:
                 "policy": over_the_interval(yardstick, plant, learned),
                 "best_of_nominal": over_the_interval(yardstick, plant, yardstick.optimum.action),
             }
-        replace(policy, manifest={**policy.manifest, "result": found}).save(self.run.path)
+        policy = replace(policy, manifest={**policy.manifest, "result": found})
+        policy.save(self.run.path)
+        write_card(policy, self.run.path)
         draw_learning(self.run.path / "metrics.csv", self.run.path / "learning.png")
         draw_policy(policy, yardstick, self.run.path / "policy.png")
         record_stages(self.task, self.run.path, table)
