@@ -168,7 +168,7 @@ JUDGES: dict[str, Callable[[GazeRecord], Events]] = {
 class Options:
     """Sample, judge, print."""
 
-    policies: tuple[str, ...] = ("lpf-1", "lpf-human", "mujoco-1", "tavares-gaze", "modal-gaze")
+    policies: tuple[str, ...] = ("lpf-1", "lpf-human", "mujoco-1", "tavares-gaze", "modal-gaze", "six-gaze")
     """Shipped policies, or run directories."""
     rate: float = 500.0
     """Samples in a second, Hz."""

@@ -10,7 +10,7 @@ from orient_eye.movement.trajectory import Trajectory
 from outside_judges import JUDGES, Events, Judgement, judged, of_policy
 
 SIZES = np.array([3.0, 5, 10, 20, 30])
-POLICIES = ("lpf-1", "lpf-human", "tavares-gaze")
+POLICIES = ("lpf-1", "lpf-human", "tavares-gaze", "six-gaze")
 
 
 @cache

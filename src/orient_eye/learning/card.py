@@ -121,8 +121,8 @@ def command_line(policy: Policy, task: SaccadeTask | None = None) -> str:
         words["from"] = Path(settings.origin).name
     if settings.robust:
         words["robust"] = True
-    of_presets = [_differing(preset, settings, task) for preset in PRESETS]
-    words.update(min(of_presets, key=len))
+    fewest: dict[str, Any] = min((_differing(preset, settings, task) for preset in PRESETS), key=len)
+    words |= fewest
     return shlex.join(["orient-eye", "train", *_options(words)])
 
 
