@@ -159,6 +159,7 @@ def test_it_begins_where_the_other_ended(plant: str, first: Path, tmp_path: Path
     assert float(rows[0]["gap_mean"]) == pytest.approx(gap.mean(), rel=1e-3, abs=1e-3)
     settings = json.loads((tmp_path / "second" / "run.json").read_text())["config"]
     assert settings["origin"] == str(first)
+    assert Policy.load(tmp_path / "second").manifest["config"]["origin"] == first.name
     assert settings["temperature"] == list(FINE_TUNING["temperature"])
     assert settings["updates"] == 16  # what the user says comes before what suits fine-tuning
 

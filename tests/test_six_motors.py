@@ -551,7 +551,7 @@ MALFORMED: list[tuple[Callable[[mujoco.MjSpec], None], str]] = [
 def test_a_malformed_spindle_is_told(change: Callable[[mujoco.MjSpec], None], message: str, tmp_path: Path) -> None:
     spec = bare("six")
     change(spec)
-    with pytest.raises(InputError, match=rf"is no eye of this form: .*{message}.*see CONTRIBUTING, add an eye"):
+    with pytest.raises(InputError, match=rf"is no eye of this form: .*{message}.*see docs/howto/eye.md"):
         build_model(written(spec, tmp_path))
 
 

@@ -22,7 +22,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("src", "eye_mjcf", "models", "tests", "scripts", "benchmarks", "examples", "docs", ".ci")
-PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", *(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md")))
+GUIDES = [page for folder in ("docs", "docs/start", "docs/howto") for page in (ROOT / folder).glob("*.md")]
+PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", *(str(page.relative_to(ROOT)) for page in GUIDES))
 
 SHIPPED = {
     "eye_mjcf/eye3.xml",

@@ -138,7 +138,10 @@ class Predict:
         if self.command:
             written.append(write(self.command, plant, wired, written_path(task, outcome, start, 0, wired)))
             written[-1].say("motor command")
-            say(f"to try it: {self._to_try(task, limited=wired is not None)}")
+            typed = self._to_try(task, limited=wired is not None)
+            here = "--plant" in typed or not hasattr(task.plant, "surrogate")
+            other = "" if here else " on the MuJoCo eye, not on its surrogate"
+            say(f"to try it{other}: {typed}")
         if self.back:
             motors, step_s = (plant.motors, plant.step_s) if wired is None else (wired.limited, wired.step_s)
             back = way_back(final_of(plant, outcome, 0), motors, step_s)

@@ -49,7 +49,7 @@ def build_model(
     """Compile an eye.
 
     Args:
-        eye: preset, one of `EYES`, or an MJCF file of the same form (CONTRIBUTING: "Add an eye").
+        eye: preset, one of `EYES`, or an MJCF file of the same form (docs/howto/eye.md).
         step_s: integration step [s]; the servos' gains follow it.
         gravity: add the gravity torque of the thesis, Cm x m g (3.8, 3.9), as a constant force at
             the centre of mass. It adds an actuator without control, after the motors'.
@@ -91,7 +91,7 @@ def build_model(
     except (ValueError, KeyError, AttributeError) as error:  # a part is not there, or does not compile
         if isinstance(error, InputError):
             raise
-        raise InputError(f"eye {eye!r} is no eye of this form: {error}; see CONTRIBUTING, add an eye") from error
+        raise InputError(f"eye {eye!r} is no eye of this form: {error}; see docs/howto/eye.md") from error
     return model
 
 
@@ -119,7 +119,7 @@ def load_spec(eye: str) -> mujoco.MjSpec:
 
 
 def _read(file: Path) -> mujoco.MjSpec:
-    hint = "give an MJCF file (CONTRIBUTING.md, add an eye), with its meshes beside it"
+    hint = "give an MJCF file (docs/howto/eye.md), with its meshes beside it"
     if not os.path.isfile(file):  # a pipe has nothing beside it
         raise InputError(f"{printable(file)} is no eye: there is no such file; {hint}")
     read_bytes(file, most=_LARGEST_BYTES, hint=hint)

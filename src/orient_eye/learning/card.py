@@ -118,7 +118,7 @@ def command_line(policy: Policy, task: SaccadeTask | None = None) -> str:
         words["case"] = settings.case
     words |= _task_options(task, settings)
     if settings.origin:
-        words["from"] = Path(settings.origin).name
+        words["from"] = Path(settings.origin).name  # until 0.6 with its path
     if settings.robust:
         words["robust"] = True
     fewest: dict[str, Any] = min((_differing(preset, settings, task) for preset in PRESETS), key=len)

@@ -295,6 +295,7 @@ class _Run:
         biases = tuple(layer.bias.detach().cpu().numpy().astype(float) for layer in layers)
         apart = ("task", "weights_from", "case")
         config = {name: value for name, value in asdict(self.settings).items() if name not in apart}
+        config["origin"] = Path(self.settings.origin).name  # the policy holds no path of this machine
         return Policy.of_task(
             self.task, weights, biases, case=self.settings.case, config=config, versions=versions(), result={}
         )
@@ -334,6 +335,6 @@ class _Run:
         draw_learning(self.run.path / "metrics.csv", self.run.path / "learning.png")
         draw_policy(policy, yardstick, self.run.path / "policy.png")
         record_stages(self.task, self.run.path, table)
-        result = {"out": str(self.run.path), **found}  # the policy holds no path of this machine
+        result = {"out": str(self.run.path), **found}  # nor this one
         self.run.write_json("result.json", result)
         return result

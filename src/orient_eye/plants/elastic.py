@@ -88,7 +88,7 @@ class ElasticPlant(SimulatedPlant):
                 raise InputError(
                     f"eye {self.options['eye']!r} does not rest straight ahead, under tension, with its motors at "
                     f"{np.round(at[0], 2).tolist()} deg: give it a keyframe pretension_N that says where they rest "
-                    "(CONTRIBUTING, add an eye)"
+                    "(docs/howto/eye.md)"
                 )
         if are_limited(self.motors):
             self.horizon_s = float(np.ceil(10 * (HORIZON_S + travel_s(self.motors))) / 10)

@@ -134,7 +134,7 @@ def _write(path: Path, content: _Content, model: mujoco.MjModel) -> Path:
     scene = Scene(model, poses, drawn, graticule=curves.graticule, muscles=muscles)
     vectors = RotationVectors(trajectory.orientation[drawn]) if "torsion" in curves.turns else None
     plots, compared = curves.plots(), curves.compared()
-    lasts_s = float(trajectory.time[-1])
+    lasts_s, several = float(trajectory.time[-1]), len(content.tabs) > 1
 
     def draw(rec: "rr.RecordingStream") -> None:
         rec.send_blueprint(blueprint(shown, plots, compared, scene, vectors, lasts_s=lasts_s), make_active=False)
@@ -154,7 +154,7 @@ def _write(path: Path, content: _Content, model: mujoco.MjModel) -> Path:
                 scene.draw_moment(rec, root, trajectory.orientation[k], trajectory.time)
             if vectors:
                 vectors.draw_path(rec, f"{tab.root}/listing", trajectory.orientation[k], trajectory.time, tab.colour)
-            curves.draw(rec, tab.root, k, title=tab.title, colour=tab.colour)
+            curves.draw(rec, tab.root, k, title=tab.title if several else "", colour=tab.colour)
 
     return write(path, (shown, plots, compared), draw)
 
