@@ -1,5 +1,6 @@
 """How Sphinx makes the site from these pages: `make docs`. What is not here is Sphinx' usual."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -33,6 +34,12 @@ smartquotes = False  # an option begins with two hyphens
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
+profile = Path(__file__).parent / "_build" / "ipython" / "profile_default"  # not the one at home
+profile.mkdir(parents=True, exist_ok=True)
+(profile / "ipython_kernel_config.py").write_text(
+    "c.InlineBackend.figure_formats = {'svg'}\nc.IPKernelApp.log_level = 40\n"
+)
+os.environ["IPYTHONDIR"] = str(profile.parent)
 
 # Docstrings are Google's style with Markdown's backticks: docs/extensions/docstrings.py.
 default_role = "py:obj"
