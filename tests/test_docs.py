@@ -218,6 +218,9 @@ def test_docstrings_are_turned() -> None:
         "    x: a *star*.",
     ]
     turned = "\n".join(docstrings.converted(told))
+    assert list(docstrings.converted(["A move.", "", "made = move(x)", "made.end"]))[-4:] == [
+        *("", "    made = move(x)", "    made.end", ""),
+    ]
     assert r":py:obj:`eyes <eyes>` of \|D - F\| deg" in turned
     assert ":py:obj:`Plant <orient_eye.plants.Plant>` and ``a b``\\ s." in turned
     assert "::\n\n    move(x)  # `as it is`" in turned

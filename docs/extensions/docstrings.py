@@ -4,6 +4,7 @@ Napoleon turns Google's sections. This turns the rest, before it: headings, tabl
 which those around a name become a link where Sphinx knows the name.
 """
 
+import ast
 import re
 from collections.abc import Iterator
 from itertools import groupby
@@ -16,6 +17,7 @@ from made_pages import homes
 
 _SECTION = re.compile(r"(Args|Attributes|Raises|Returns|Yields):")
 _CODE = re.compile(r"(`[^`]+`)")
+_FILE = re.compile(r"\w+\.py {2,}\w")
 _NAME = re.compile(r"[A-Za-z_][\w.]*")
 _ARRAY = re.compile(r"~?(?:numpy\.)?ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?(?:numpy\.)?dtype\[([^\[\]]+)\]\]")
 _ARRAY_LIKE = re.compile(r"~?[\w.]*_Buffer \| .*?_NestedSequence\[~?complex \| ~?bytes \| ~?str\]")
@@ -53,7 +55,7 @@ def _short(
 
 def converted(lines: list[str]) -> Iterator[str]:
     """Lines of reStructuredText, with Google's sections as they are."""
-    for kind, group in groupby(_kinds(lines), itemgetter(0)):
+    for kind, group in groupby(_kinds(_indented(lines)), itemgetter(0)):
         told = [line for _, line in group]
         if kind == "table":
             yield from _table(told)
@@ -63,6 +65,22 @@ def converted(lines: list[str]) -> Iterator[str]:
             yield from ("", f".. rubric:: {told[0].removeprefix('## ')}", "")
         else:
             yield from _inline("\n".join(told)).split("\n")
+
+
+def _indented(lines: list[str]) -> list[str]:
+    """With examples indented that make up a docstring but for its first line: the formatter does not let them be."""
+    paragraphs = [list(group) for _, group in groupby(lines, bool)]
+    return [f"    {line}" if _is_example(paragraph) else line for paragraph in paragraphs for line in paragraph]
+
+
+def _is_example(paragraph: list[str]) -> bool:
+    """Lines of Python that call something, or a list of files."""
+    if all(_FILE.match(line) for line in paragraph):
+        return True
+    try:
+        return any(isinstance(node, ast.Call) for node in ast.walk(ast.parse("\n".join(paragraph))))
+    except (SyntaxError, ValueError):
+        return False
 
 
 def _kinds(lines: list[str]) -> Iterator[tuple[str, str]]:
