@@ -1,5 +1,6 @@
 """How Sphinx makes the site from these pages: `make docs`. What is not here is Sphinx' usual."""
 
+import logging
 import os
 import sys
 from pathlib import Path
@@ -39,6 +40,7 @@ profile.mkdir(parents=True, exist_ok=True)
 (profile / "ipython_kernel_config.py").write_text(
     "c.InlineBackend.figure_formats = {'svg'}\nc.IPKernelApp.log_level = 40\n"
 )
+logging.getLogger("traitlets").setLevel(logging.WARNING)
 os.environ["IPYTHONDIR"] = str(profile.parent)
 
 # Docstrings are Google's style with Markdown's backticks: docs/extensions/docstrings.py.
