@@ -51,7 +51,6 @@ autodoc_default_options = {
     "exclude-members": "differential_evolution",  # scipy's, whose signature cannot be read
 }
 autodoc_typehints_format = "short"
-autodoc_preserve_defaults = True
 python_maximum_signature_line_length = 88
 add_module_names = False
 napoleon_use_rtype = False
