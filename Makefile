@@ -4,21 +4,25 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 LOWEST := .venv-lowest
-EXTRAS := .[dev,judges,onnx,physical,tensorboard]
+EXTRAS := .[dev,docs,judges,onnx,physical,tensorboard]
 DEMO ?= demo
+LINTED := src tests scripts benchmarks examples docs/conf.py docs/extensions docs/notebooks
 PYTEST := -m pytest -n auto
+SPHINX := -m sphinx --fail-on-warning --keep-going --quiet --doctree-dir docs/_build/doctrees
 # A file's tests share what they prepare; files with slow tests begin first (tests/conftest.py).
 BY_FILE := --dist loadfile --no-loadscope-reorder
 FUZZ_EXAMPLES ?= 5000
 FAULTS ?= 20
 COVERAGE ?= --cov --cov-report=term:skip-covered
 
-.PHONY: help demo test check fuzz faults lowest rigs bench clean
+.PHONY: help demo test check docs links fuzz faults lowest rigs bench clean
 
 help:
 	@echo "make demo   install, identify the eye, train a saccade policy (minutes), picture and recording in $(DEMO)/"
 	@echo "make test   install and run all tests, with coverage of lines and branches; make test COVERAGE= is faster"
 	@echo "make check  ruff and the type checker"
+	@echo "make docs   the documentation as a site, its notebooks run: docs/_build/html; a warning or a broken link fails"
+	@echo "make links  the site's links to the outside, which needs the network"
 	@echo "make fuzz   $(FUZZ_EXAMPLES) inputs for each reader and public function, and a table of what held; FUZZ_EXAMPLES=..."
 	@echo "make faults $(FAULTS) kills and full disks of each kind for every command, and a table of what held; FAULTS=..."
 	@echo "make lowest fast tests with the lowest versions that pyproject.toml allows, in $(LOWEST) (downloads 4 GB)"
@@ -45,9 +49,15 @@ test: $(INSTALLED)
 	$(BIN)/python $(PYTEST) $(BY_FILE) $(COVERAGE)
 
 check: $(INSTALLED)
-	$(BIN)/ruff check src tests scripts benchmarks examples
-	$(BIN)/ruff format --check src tests scripts benchmarks examples
+	$(BIN)/ruff check $(LINTED)
+	$(BIN)/ruff format --check $(LINTED)
 	$(BIN)/mypy
+
+docs: $(INSTALLED)
+	$(BIN)/python $(SPHINX) --builder html docs docs/_build/html
+
+links: $(INSTALLED)
+	$(BIN)/python $(SPHINX) --builder linkcheck docs docs/_build/links
 
 fuzz: $(INSTALLED)
 	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python $(PYTEST) tests/test_fuzz_*.py
@@ -75,4 +85,4 @@ bench: $(INSTALLED)
 	$(BIN)/python benchmarks/growth.py
 
 clean:
-	rm -rf $(VENV) $(LOWEST) $(DEMO) .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(LOWEST) $(DEMO) docs/_build docs/elsewhere docs/reference/*/ .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis
