@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 LOWEST := .venv-lowest
-EXTRAS := .[dev,judges,onnx,physical,tensorboard]
+EXTRAS := .[cluster,dev,judges,onnx,physical,tensorboard]
 DEMO ?= demo
 PYTEST := -m pytest -n auto
 # A file's tests share what they prepare; files with slow tests begin first (tests/conftest.py).
@@ -73,6 +73,7 @@ bench: $(INSTALLED)
 	$(BIN)/python benchmarks/learning.py --profile
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/growth.py
+	$(BIN)/python benchmarks/sweeps.py
 
 clean:
 	rm -rf $(VENV) $(LOWEST) $(DEMO) .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis
