@@ -27,7 +27,8 @@ from orient_eye.learning.config import TrainConfig, TrainSettings
 from orient_eye.learning.grid import config_of, named, product_of
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.spread import spread
-from orient_eye.learning.sweep import RunState, Sweep
+from orient_eye.learning.sweep import Sweep
+from orient_eye.learning.sweep_results import RunState
 from orient_eye.learning.training import Interrupted, train
 from orient_eye.resources import cores
 from test_checkpoint import _middle, assert_same
@@ -37,9 +38,8 @@ WORDS = [word for name, value in TINY.items() for word in (f"--{name.replace('_'
 PERFORM = workers.perform
 
 
-@pytest.fixture(autouse=True, scope="module")
-def quickly(private_cache: None) -> Iterator[None]:
-    """No search, pictures or TensorBoard, here and in workers, which know nothing of patches in this process."""
+def quick() -> Callable[..., None]:
+    """A worker's work without search, pictures or TensorBoard; workers know nothing of patches in this process."""
 
     def perform(*given: Any) -> None:
         from orient_eye.learning import figures, loop, stages, workers
@@ -56,11 +56,17 @@ def quickly(private_cache: None) -> Iterator[None]:
         loop.TrainingLoop._tensorboard = lambda _: None
         workers.perform(*given)
 
+    return perform
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quickly(private_cache: None) -> Iterator[None]:
+    """The same in this process too."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("orient_eye.search.optimum_cache.find_optimum", _middle)
         without_pictures(patch)
         patch.setattr("orient_eye.learning.loop.TrainingLoop._tensorboard", lambda _: None)
-        patch.setattr("orient_eye.learning.sweep.perform", perform)
+        patch.setattr("orient_eye.learning.sweep.perform", quick())
         yield
 
 

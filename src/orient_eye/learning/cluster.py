@@ -16,10 +16,12 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -81,7 +83,7 @@ class OnRay:
         """As `Engine.crew`."""
         import ray
 
-        with _connected(self.address):
+        with redirect_stdout(_Sieve(sys.stdout)), _connected(self.address):
             try:
                 nodes = {node["NodeID"]: node for node in ray.nodes() if node["Alive"] and _cpus(node)}
                 if not nodes:
@@ -128,6 +130,20 @@ def _call(work: Callable[[], Any]) -> Any:
     return work()
 
 
+class _Sieve:
+    """A stream without what Ray's own threads print, of workers that were lost say; the rest goes on as it is."""
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        ray = threading.current_thread().name.startswith("ray_")
+        return len(text) if ray else int(self.stream.write(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
 @contextmanager
 def _connected(address: str | None) -> Iterator[None]:
     """With a driver of Ray in this process, and a Ray of its own where no address is given."""
@@ -157,16 +173,14 @@ def _options(address: str | None, own: Path | None) -> dict[str, Any]:
     if address is not None:
         return {"address": address, **quiet}
     alone = {"address": "local", "num_cpus": cores(), "include_dashboard": False, "object_store_memory": _STORE}
-    return {**alone, "_temp_dir": str(own), **quiet}
+    return {**alone, "_temp_dir": str(own / "ray"), **quiet}
 
 
 @contextmanager
 def _surroundings(own: Path | None) -> Iterator[None]:
     """Environment variables for Ray; of one of its own with a password that nobody else knows."""
-    told = dict(_QUIET)
-    if own is not None:
-        told |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32)}
-    before = {name: os.environ.get(name) for name in told}
+    told = _QUIET if own is None else _QUIET | {"RAY_AUTH_TOKEN": _password()}
+    before = {name: os.environ.get(name) for name in (*told, "RAY_AUTH_MODE")}  # which Ray sets
     os.environ.update(told)
     try:
         yield
@@ -176,6 +190,12 @@ def _surroundings(own: Path | None) -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+@cache
+def _password() -> str:
+    """Of this process: Ray reads it once, and without one leaves one in the home folder."""
+    return secrets.token_hex(32)
 
 
 def _short_folder() -> Path:
