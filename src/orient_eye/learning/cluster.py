@@ -149,7 +149,7 @@ def _connected(address: str | None) -> Iterator[None]:
     """With a driver of Ray in this process, and a Ray of its own where no address is given."""
     import ray
 
-    own = _short_folder() if address is None else None
+    own = None if address else _short_folder()
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     try:
         with _surroundings(own):
@@ -172,6 +172,7 @@ def _options(address: str | None, own: Path | None) -> dict[str, Any]:
     quiet = {"logging_level": "CRITICAL", "log_to_driver": False}
     if address is not None:
         return {"address": address, **quiet}
+    assert own is not None
     alone = {"address": "local", "num_cpus": cores(), "include_dashboard": False, "object_store_memory": _STORE}
     return {**alone, "_temp_dir": str(own / "ray"), **quiet}
 

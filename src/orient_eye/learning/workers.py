@@ -21,6 +21,7 @@ from typing import Any
 from orient_eye.errors import Ended, InputError
 from orient_eye.files import read_json, write_json, write_text
 from orient_eye.learning.config import TrainConfig
+from orient_eye.learning.loop import StopRequest
 from orient_eye.resources import share_cores
 
 WAITING, RUNNING, DONE, STOPPED, FAILED = "waiting", "running", "done", "stopped", "failed"
@@ -181,7 +182,9 @@ def _working(board: Board, cores: int) -> Iterator[None]:
     def look() -> None:
         while not over.wait(_LOOKS_S):
             if board.stopped or board.abandoned:
-                os.kill(os.getpid(), signal.SIGTERM)
+                asked = StopRequest.now
+                if asked is None or asked.signal is None:  # twice would be at once, without a checkpoint
+                    os.kill(os.getpid(), signal.SIGTERM)
                 return
 
     looking = threading.Thread(target=look, daemon=True)
