@@ -23,7 +23,7 @@ help:
 	@echo "make faults $(FAULTS) kills and full disks of each kind for every command, and a table of what held; FAULTS=..."
 	@echo "make lowest fast tests with the lowest versions that pyproject.toml allows, in $(LOWEST) (downloads 4 GB)"
 	@echo "make rigs   thirty simulated rigs, from their recorded steps to a command that they perform (an hour)"
-	@echo "make bench  speed of the plants and of the learning, start-up, and how cost grows (ten minutes)"
+	@echo "make bench  speed of the plants and of the learning, start-up, and how cost grows (fifteen minutes)"
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

@@ -5,14 +5,16 @@
 Every row is an `orient-eye sweep` of short trainings on the low-pass eye, from the command to its end, on processes of
 this machine and on a Ray of its own (where that is installed). The optimum is searched before. A straight line through
 the rows of as many workers says what a sweep costs before its first run (a worker starts and imports meanwhile), and
-what each round of runs costs, as many as there are workers; what of it is training, the run directories know. Read
-ratios within one run of this program: on a busy machine all of it is longer.
+what each round of runs costs, as many as there are workers; what of it is training, the run directories know. CPU time
+is that of the command and of the workers that it waited for (Ray's are not its own): on a busy machine read this, and
+ratios within one run of the program.
 """
 
 import argparse
 import importlib.util
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -29,12 +31,13 @@ PLAN = {("local", 1): (1, 2, 4), ("local", 2): (2, 4, 8), ("ray", 1): (1, 2, 4),
 
 
 class Row(NamedTuple):
-    """Of one sweep: seconds from beginning to end, and of the trainings in it, together."""
+    """Of one sweep: seconds from beginning to end, of CPU time, and of the trainings in it, together."""
 
     engine: str
     jobs: int
     runs: int
     wall_s: float
+    cpu_s: float
     train_s: float
 
 
@@ -47,11 +50,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         first = sweep(folder, "local", 1, 1, options.updates)  # searches the optimum
-        print(f"{'engine':8} {'workers':>8} {'runs':>6} {'wall [s]':>10} {'of it training, a run [s]':>27}")
+        print(f"{'engine':8} {'workers':>8} {'runs':>6} {'wall [s]':>10} {'CPU [s]':>10} {'training, a run [s]':>20}")
         rows = []
         for engine, jobs, runs in planned(quick=options.quick):
-            rows.append(sweep(folder, engine, jobs, runs, options.updates))
-            print(f"{engine:8} {jobs:8} {runs:6} {rows[-1].wall_s:10.1f} {rows[-1].train_s / runs:27.1f}", flush=True)
+            row = sweep(folder, engine, jobs, runs, options.updates)
+            rows.append(row)
+            cpu = f"{row.cpu_s:10.1f}" if engine == "local" else f"{'':10}"
+            print(f"{engine:8} {jobs:8} {runs:6} {row.wall_s:10.1f} {cpu} {row.train_s / runs:20.1f}", flush=True)
         say_lines(rows)
         print(f"\nthe first sweep, with the search of the optimum: {first.wall_s:.1f} s")
         say_sizes(next(folder.glob("local-2-*")) / "seed0")
@@ -71,14 +76,15 @@ def sweep(folder: Path, engine: str, jobs: int, runs: int, updates: int) -> Row:
     words = f"sweep --updates {updates} --engine {engine} --jobs {jobs} --out {out} --quiet --json --seed"
     command = [sys.executable, "-m", "orient_eye", *words.split(), *map(str, range(runs))]
     environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
-    began = time.perf_counter()
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
-    wall = time.perf_counter() - began
+    wall, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     if done.returncode:
         raise SystemExit(f"{' '.join(command)} ended with {done.returncode}:\n{done.stderr}")
     results = [json.loads(file.read_text()) for file in out.glob("*/result.json")]
     assert len(results) == runs
-    return Row(engine, jobs, runs, wall, sum(result["train_s"] for result in results))
+    return Row(engine, jobs, runs, wall, cpu, sum(result["train_s"] for result in results))
 
 
 def say_lines(rows: list[Row]) -> None:
@@ -93,6 +99,9 @@ def say_lines(rows: list[Row]) -> None:
         each, before = np.polyfit(rounds, [row.wall_s for row in group], 1)
         training = sum(row.train_s for row in group) / sum(row.runs for row in group)
         print(f"{engine:8} {jobs:8} {before:11.1f} {each:12.1f} {each - training:20.1f} {60 * jobs / each:14.1f}")
+    alone = [row for row in rows if row.engine == "local" and row.jobs == 1]
+    each, before = np.polyfit([row.runs for row in alone], [row.cpu_s for row in alone], 1)
+    print(f"CPU time of one worker on this machine: {before:.1f} s, and {each:.1f} s a run")
 
 
 def say_sizes(run: Path) -> None:
