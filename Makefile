@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 LOWEST := .venv-lowest
-EXTRAS := .[dev,docs,judges,onnx,physical,tensorboard]
+EXTRAS := .[cluster,dev,docs,judges,onnx,physical,tensorboard]
 DEMO ?= demo
 LINTED := src tests scripts benchmarks examples docs/conf.py docs/extensions docs/notebooks
 PYTEST := -m pytest -n auto
@@ -27,7 +27,7 @@ help:
 	@echo "make faults $(FAULTS) kills and full disks of each kind for every command, and a table of what held; FAULTS=..."
 	@echo "make lowest fast tests with the lowest versions that pyproject.toml allows, in $(LOWEST) (downloads 4 GB)"
 	@echo "make rigs   thirty simulated rigs, from their recorded steps to a command that they perform (an hour)"
-	@echo "make bench  speed of the plants and of the learning, start-up, and how cost grows (ten minutes)"
+	@echo "make bench  speed of the plants and of the learning, start-up, and how cost grows (fifteen minutes)"
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -83,6 +83,7 @@ bench: $(INSTALLED)
 	$(BIN)/python benchmarks/learning.py --profile
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/growth.py
+	$(BIN)/python benchmarks/sweeps.py
 
 clean:
 	rm -rf $(VENV) $(LOWEST) $(DEMO) docs/_build docs/elsewhere docs/reference/*/ .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis

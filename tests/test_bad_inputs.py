@@ -132,6 +132,8 @@ LINES: list[tuple[str, str]] = [
     ("sweep --resume nosuch", "cannot read nosuch/sweep.json"),
     ("sweep --resume folder", "cannot read folder/sweep.json: .* no folder of a sweep"),
     ("sweep --resume folder --seed 1", "leave the other options out"),
+    ("sweep --seed 0 1 --engine nosuch", "invalid choice 'nosuch' for argument '--engine'"),
+    ("sweep --seed 0 1 --address auto", "the address 'auto' is of a cluster, add --engine ray, or leave it out"),
     ("report --figures 9.9", "unknown figure '9.9'"),
     ("report --pairs 0", "pairs must be a whole number"),
     ("report nosuch", "nosuch is no policy"),

@@ -437,7 +437,8 @@ ELSEWHERE = {
     "cli.check": "tests/test_check.py: the same tables as sysid.recordings",
     "cli.predict": "reads what cli.saccades reads",
     "learning.training": "run.json; tests/test_training.py",
-    "learning.sweep": "sweep.json and result.json; tests/test_sweep.py",
+    "learning.sweep": "sweep.json; tests/test_sweep.py",
+    "learning.sweep_results": "result.json of runs; tests/test_sweep.py",
     "learning.workers": "what workers tell each other; tests/test_sweep.py",
     "cli.sweep": "a sweep's TOML; tests/test_sweep.py",
     "learning.checkpoint": "tests/test_checkpoint.py",
@@ -452,7 +453,8 @@ OF_OURS = {
     "human.py": "shipped data",
     "report/page.py": "the template of the page",
     "learning/figures/page.py": "the metrics of a run, while it is made",
-    "learning/sweep.py": "the same",
+    "learning/sweep_results.py": "the same",
+    "learning/cluster.py": "a word that it has just written, to see whether another machine sees it",
 }
 """Who opens a file by himself, and why."""
 

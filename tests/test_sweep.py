@@ -5,6 +5,8 @@ import itertools
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -21,13 +23,15 @@ from orient_eye.cli import main
 from orient_eye.cli.options import parse
 from orient_eye.cli.sweep import Sweep as Command
 from orient_eye.cli.sweep import live_table, read_runs
-from orient_eye.errors import InputError
+from orient_eye.errors import Ended, InputError
 from orient_eye.learning import workers
 from orient_eye.learning.config import TrainConfig, TrainSettings
 from orient_eye.learning.grid import config_of, named, product_of
+from orient_eye.learning.loop import StopRequest
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.spread import spread
-from orient_eye.learning.sweep import RunState, Sweep
+from orient_eye.learning.sweep import Sweep
+from orient_eye.learning.sweep_results import RunState
 from orient_eye.learning.training import Interrupted, train
 from orient_eye.resources import cores
 from test_checkpoint import _middle, assert_same
@@ -37,9 +41,8 @@ WORDS = [word for name, value in TINY.items() for word in (f"--{name.replace('_'
 PERFORM = workers.perform
 
 
-@pytest.fixture(autouse=True, scope="module")
-def quickly(private_cache: None) -> Iterator[None]:
-    """No search, pictures or TensorBoard, here and in workers, which know nothing of patches in this process."""
+def quick() -> Callable[..., None]:
+    """A worker's work without search, pictures or TensorBoard; workers know nothing of patches in this process."""
 
     def perform(*given: Any) -> None:
         from orient_eye.learning import figures, loop, stages, workers
@@ -56,11 +59,17 @@ def quickly(private_cache: None) -> Iterator[None]:
         loop.TrainingLoop._tensorboard = lambda _: None
         workers.perform(*given)
 
+    return perform
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quickly(private_cache: None) -> Iterator[None]:
+    """The same in this process too."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("orient_eye.search.optimum_cache.find_optimum", _middle)
         without_pictures(patch)
         patch.setattr("orient_eye.learning.loop.TrainingLoop._tensorboard", lambda _: None)
-        patch.setattr("orient_eye.learning.sweep.perform", perform)
+        patch.setattr("orient_eye.learning.sweep.perform", quick())
         yield
 
 
@@ -387,6 +396,36 @@ def test_a_worker_has_its_share_of_the_cores(tmp_path: Path) -> None:
 
     resources._SHARE.clear()
     assert cores() == before
+
+
+def test_a_worker_that_is_told_with_its_sweep_still_writes_its_checkpoint(tmp_path: Path) -> None:
+    """A signal to the whole group reaches it too, and the board repeats it: that counts once."""
+    board = workers.Board(tmp_path, os.getppid())
+    with workers._working(board, 1), StopRequest() as request:
+        signal.raise_signal(signal.SIGTERM)
+        board.stop()
+        time.sleep(5 * workers._LOOKS_S)  # a second signal would end the block
+        assert request.signal == signal.SIGTERM
+    with pytest.raises(Ended), workers._working(board, 1):  # told by the board alone
+        time.sleep(60)
+    from orient_eye import resources
+
+    resources._SHARE.clear()
+
+
+def test_an_idle_worker_ends_with_its_sweep(tmp_path: Path) -> None:
+    """Killed, it cannot end its workers, and they would wait for work for minutes."""
+    program = (
+        "import os, time; from pathlib import Path; from orient_eye.learning import workers\n"
+        "parent = os.getpid()\n"
+        "if os.fork():\n    time.sleep(1)\n    os._exit(0)\n"
+        f"with workers._working(workers.Board(Path({str(tmp_path)!r}), parent), 1): pass\n"
+        f"Path({str(tmp_path / 'idle')!r}).touch()\ntime.sleep(100)\n"
+    )
+    began = time.monotonic()
+    subprocess.run([sys.executable, "-c", program], check=True, stdout=subprocess.PIPE)  # until nobody can write to it
+    assert (tmp_path / "idle").exists()
+    assert time.monotonic() - began < 90
 
 
 def test_a_run_killed_before_it_could_explain_itself_begins_anew(made: Path, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Options that come from the registries, so that whatever is registered is offered, and its own options too.
 
-A field of a command named `plant`, `case`, `targets` or `pulse` takes the names of that registry. A field
+A field of a command named `plant`, `case`, `targets`, `pulse` or `engine` takes the names of that registry. A field
 `plant_options` becomes the union of all plants' own options; what is given of them is its value.
 
     command = parse(Simulate, ["--motor", "x.csv", "--plant", "mujoco", "--accurate"], program="orient-eye simulate")
@@ -22,13 +22,16 @@ import tyro
 from orient_eye.cli.tables import say
 from orient_eye.commands.pulses import PULSES
 from orient_eye.errors import InputError
+from orient_eye.learning.engines import ENGINES
 from orient_eye.plants import PLANTS, Option
 from orient_eye.registry import Registry
 from orient_eye.task.cases import CASES
 from orient_eye.task.target_sets import TARGETS
 
 T = TypeVar("T")
-REGISTRIES: dict[str, Registry[Any]] = {"plant": PLANTS, "case": CASES, "targets": TARGETS, "pulse": PULSES}
+REGISTRIES: dict[str, Registry[Any]] = {
+    "plant": PLANTS, "case": CASES, "targets": TARGETS, "pulse": PULSES, "engine": ENGINES,
+}  # fmt: skip
 """Field of a command to where its names stand."""
 _RIG = "rig"
 """The option of a plant that also says something of a policy's own plant, and that a command may have as its own."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from orient_eye.cli.tables import Cell, Row
-    from orient_eye.learning.sweep import RunState
+    from orient_eye.learning.sweep_results import RunState
 
 _LARGEST = 2**20  # bytes of a file of options
 _EXAMPLE = '[options] with case = ["1", "2-fixed"] and seed = [0, 1, 2]'
@@ -38,6 +38,8 @@ class Sweep:
     $ orient-eye sweep sweep.toml --out runs/sweep --jobs 8
 
     $ orient-eye sweep --resume runs/sweep
+
+    $ orient-eye sweep --out shared/sweep --seed 0 1 2 --engine ray --address head:6379
     """
 
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[FILE.toml]")] = None
@@ -50,6 +52,10 @@ class Sweep:
     """Folder of a sweep to go on with; takes the sweep's own options."""
     jobs: Annotated[int | None, tyro.conf.arg(help_behavior_hint="(default: one for each core)")] = None
     """Runs at a time, each in a process with its share of the cores; with 1 in this process."""
+    engine: str = "local"
+    """Where the runs are carried out: processes of this machine, or a Ray cluster (docs/sweep.md)."""
+    address: Annotated[str | None, tyro.conf.arg(help_behavior_hint="(default: a Ray of its own here)")] = None
+    """Of the cluster, with --engine ray: auto, HOST:PORT or ray://HOST:PORT."""
     quiet: bool = False
     """Show no table while it goes on."""
     checkpoint_every: float = 20.0
@@ -59,19 +65,20 @@ class Sweep:
         """Begin or go on."""
         from orient_eye.cli.tables import say
         from orient_eye.errors import InputError
+        from orient_eye.learning.engines import ENGINES, jobs_of
         from orient_eye.learning.grid import named, product_of
         from orient_eye.learning.sweep import Sweep as Folder
-        from orient_eye.learning.sweep import jobs_of
         from orient_eye.learning.training import Interrupted, check_interval
         from orient_eye.progress import live
 
         check_interval(self.checkpoint_every)  # before there is a folder
-        jobs = jobs_of(self.jobs)
+        jobs_of(self.jobs, 1)
         if self.resume and (self.file or self.grid or self.out):
             raise InputError("--resume takes the sweep's own options and folder; leave the other options out")
         if self.file and self.grid:
             told = ", ".join(self.grid)
             raise InputError(f"the options stand in {self.file} or on the command line, not in both; leave {told} out")
+        engine = ENGINES[self.engine](self.address)
         if self.resume:
             sweep = Folder.open(self.resume)
         else:
@@ -82,7 +89,7 @@ class Sweep:
         try:
             with live(quiet=self.quiet) as screen:
                 show = None if screen is None else lambda states: screen(live_table(states))
-                result = sweep.carry_out(jobs=jobs, checkpoint_s=self.checkpoint_every, show=show)
+                result = sweep.carry_out(jobs=self.jobs, engine=engine, checkpoint_s=self.checkpoint_every, show=show)
         except Interrupted as stopped:
             say(str(stopped))
             raise SystemExit(stopped.code) from None

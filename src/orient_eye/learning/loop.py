@@ -4,7 +4,7 @@ import signal
 import time
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,7 +175,10 @@ class StopRequest:
 
     Attributes:
         signal: that was received; None as long as there is none.
+        now: the one that is heeded at present, in this process.
     """
+
+    now: "ClassVar[StopRequest | None]" = None
 
     def __init__(self) -> None:
         self.signal: int | None = None
@@ -188,11 +191,13 @@ class StopRequest:
                     self.before[number] = signal.signal(number, self._handle)
             except ValueError:  # not in the main thread: Python's own handlers stay
                 break
+        StopRequest.now = self
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
+        StopRequest.now = None
         for number, handler in self.before.items():
             signal.signal(number, handler)
 

@@ -2,7 +2,7 @@
 
 A worker carries out one run after the other, each as `train` or `resume` does. It heeds no signal of a terminal: the
 one who waits is told to stop, writes that on the board, and every worker then stops its training at the next update,
-with a checkpoint. It does so too when the one who waits is gone.
+with a checkpoint. On this machine it does so too when the one who waits is gone, and ends; on a cluster it is ended.
 """
 
 import os
@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -20,12 +21,16 @@ from typing import Any
 from orient_eye.errors import Ended, InputError
 from orient_eye.files import read_json, write_json, write_text
 from orient_eye.learning.config import TrainConfig
+from orient_eye.learning.loop import StopRequest
 from orient_eye.resources import share_cores
 
 WAITING, RUNNING, DONE, STOPPED, FAILED = "waiting", "running", "done", "stopped", "failed"
 """How it stands with a run."""
+MOST_LOST = 5
+"""Workers in a row that a run may lose, before it counts as what kills them."""
 _LOOKS_S = 0.2
 _PATIENCE_S = 20.0
+_BUSY = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -34,16 +39,26 @@ class Board:
 
     Attributes:
         folder: of the board.
-        waits: process that waits for the workers.
+        waits: process that waits for the workers, their parent; None on a cluster.
+        cwd: folder in which it stands, to which workers of a cluster go; None where they stand there too.
     """
 
     folder: Path
-    waits: int
+    waits: int | None
+    cwd: Path | None = None
 
-    def tell(self, run: str, state: str, why: str = "", notes: tuple[str, ...] = ()) -> None:
-        """Write how it stands with a run; what cannot be written is not told."""
+    def tell(self, run: str, state: str, why: str = "", notes: tuple[str, ...] = (), lost: int = 0) -> None:
+        """Write how it stands with a run; what cannot be written is not told.
+
+        Args:
+            run: its name.
+            state: of it.
+            why: it failed.
+            notes: warnings of the training.
+            lost: workers that did not come to its end.
+        """
         with suppress(InputError):
-            write_json(self.folder / f"{run}.json", {"state": state, "why": why, "notes": notes})
+            write_json(self.folder / f"{run}.json", {"state": state, "why": why, "notes": notes, "lost": lost})
 
     def told(self, run: str) -> dict[str, Any]:
         """What was told last of a run."""
@@ -51,16 +66,21 @@ class Board:
             found = read_json(self.folder / f"{run}.json", hint="")
         except InputError:
             found = None
-        return found if isinstance(found, dict) else {"state": WAITING, "why": "", "notes": []}
+        return found if isinstance(found, dict) else {"state": WAITING, "why": "", "notes": [], "lost": 0}
 
     def stop(self) -> None:
         """Have all workers stop."""
         write_text(self.folder / "stop", "")
 
     @property
+    def apart(self) -> bool:
+        """Whether this process is not the one that waits."""
+        return self.waits is None or os.getpid() != self.waits
+
+    @property
     def abandoned(self) -> bool:
-        """Whether the process that waited for this worker is gone."""
-        return os.getppid() != self.waits
+        """Whether the process that waited for this worker is gone; on a cluster this one is then ended."""
+        return self.waits is not None and os.getppid() != self.waits
 
     @property
     def stopped(self) -> bool:
@@ -79,25 +99,26 @@ def perform(run: str, config: TrainConfig, out: Path, board: Board, checkpoint_s
         checkpoint_s: seconds between checkpoints.
         cores: of the machine, for this worker's threads.
     """
-    if board.stopped:
+    if board.stopped or (out / "result.json").exists():
         return
-    apart = os.getpid() != board.waits
-    board.tell(run, RUNNING)
+    told = board.told(run)
+    lost = told["lost"] + (told["state"] in (RUNNING, STOPPED))
+    if lost >= MOST_LOST:
+        board.tell(run, FAILED, f"its worker, or one beside it, was killed {lost} times; is memory short?")
+        return
+    board.tell(run, RUNNING, lost=lost)
     try:
-        with _working(board, cores) if apart else _here(), warnings.catch_warnings(record=True) as heard:
+        with _working(board, cores) if board.apart else _here(), warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("default")
             _take_up(config, out, checkpoint_s)
         notes = tuple(str(each.message) for each in heard if each.category is UserWarning)
         board.tell(run, DONE, notes=notes)
     except KeyboardInterrupt:
-        if not apart:
+        if not board.apart:
             raise
-        if board.abandoned:
-            os._exit(1)  # nobody gives this worker anything to do, nor has it end
-        board.tell(run, STOPPED)
+        board.tell(run, STOPPED, lost=lost)
     except Exception as error:  # of another package's plant, say: the other runs go on
-        told = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-        board.tell(run, FAILED, told)
+        board.tell(run, FAILED, str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}")
 
 
 def _take_up(config: TrainConfig, out: Path, checkpoint_s: float) -> None:
@@ -149,6 +170,11 @@ def _here() -> Iterator[None]:
 def _working(board: Board, cores: int) -> Iterator[None]:
     """In this block a worker ends by what the board says alone, and has its share of the machine."""
     share_cores(cores)
+    if board.cwd is not None:
+        with suppress(OSError):  # a machine that has no such folder
+            os.chdir(board.cwd)
+    if board.waits is not None:
+        _end_with(board.waits)
     before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGHUP)}
     before[signal.SIGTERM] = signal.signal(signal.SIGTERM, _end)
     over = threading.Event()
@@ -156,18 +182,34 @@ def _working(board: Board, cores: int) -> Iterator[None]:
     def look() -> None:
         while not over.wait(_LOOKS_S):
             if board.stopped or board.abandoned:
-                os.kill(os.getpid(), signal.SIGTERM)
+                asked = StopRequest.now
+                if asked is None or asked.signal is None:  # twice would be at once, without a checkpoint
+                    os.kill(os.getpid(), signal.SIGTERM)
                 return
 
     looking = threading.Thread(target=look, daemon=True)
     looking.start()
     try:
-        yield
+        with _BUSY:
+            yield
     finally:
         over.set()
         looking.join()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@cache
+def _end_with(parent: int) -> None:
+    """End this process when that one is gone, as soon as it has nothing to do: nobody gives it more, or ends it."""
+
+    def look() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOKS_S)
+        with _BUSY:
+            os._exit(1)
+
+    threading.Thread(target=look, daemon=True).start()
 
 
 def _end(number: int, _: FrameType | None) -> None:

@@ -15,7 +15,7 @@ from orient_eye.learning.spread import spread
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from orient_eye.learning.sweep import Setting
+    from orient_eye.learning.sweep_results import Setting
 
 _MOST = 40  # settings that a page holds
 _LEAST = 1e-6  # gap that the logarithm shows
