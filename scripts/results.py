@@ -101,8 +101,8 @@ def results(folder: Path) -> dict[tuple[str, str], list[dict[str, Any]]]:
 def table(folder: Path) -> str:
     """The results as a Markdown table: one row a case, the seeds beside one another."""
     lines = [
-        "| plant | case | training s | mean gap % | 95th percentile % | B at 30 deg | D - F | k0 | best found |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| plant | case | mean gap % | 95th percentile % | B at 30 deg | D - F | k0 | best found |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for (plant, case), runs in results(folder).items():
         rows = [next(row for row in run["table"] if row["amplitude_deg"] == 30) for run in runs]
@@ -112,7 +112,7 @@ def table(folder: Path) -> str:
 
         best = rows[0]
         lines.append(
-            f"| {plant} | {case} | {told_seconds(runs)} | {by_seed([100 * r['gap_mean'] for r in runs], 2)} | "
+            f"| {plant} | {case} | {by_seed([100 * r['gap_mean'] for r in runs], 2)} | "
             f"{by_seed([100 * r['gap_p95'] for r in runs], 2)} | {by_seed([r['B'] for r in rows], 2)} | "
             f"{by_seed([r['step_deg'] for r in rows], 3)} | {by_seed([r['k0'] for r in rows], 2)} | "
             f"{best['B_best']:.2f}, {best['step_deg_best']:.3f}, {best['k0_best']:.2f} |"
@@ -122,16 +122,11 @@ def table(folder: Path) -> str:
 
 def short_table(folder: Path) -> str:
     """Gaps alone."""
-    lines = ["| plant | case | mean gap, each seed | 95th percentile | training s |", "|---|---|---|---|---|"]
+    lines = ["| plant | case | mean gap, each seed | 95th percentile |", "|---|---|---|---|"]
     for (plant, case), runs in results(folder).items():
         mean, high = (", ".join(f"{100 * run[key]:.2f} %" for run in runs) for key in ("gap_mean", "gap_p95"))
-        lines.append(f"| {plant} | {case} | {mean} | {high} | {told_seconds(runs)} |")
+        lines.append(f"| {plant} | {case} | {mean} | {high} |")
     return "\n".join(lines)
-
-
-def told_seconds(runs: list[dict[str, Any]]) -> str:
-    """How long the trainings took, without search and pictures."""
-    return ", ".join(f"{run['train_s']:.0f}" for run in runs)
 
 
 def write(path: Path, text: str) -> None:
