@@ -161,8 +161,6 @@ class Predict:
         surrogate = getattr(task.plant, "surrogate", None)
         stranger = surrogate is not None and surrogate.eye is None  # whose motors are none of the default plant's
         file = self._surrogate_file() if stranger else None
-        if stranger and file is None:
-            return f"{shlex.join(words)}, with the surrogate that the policy has learned on (--surrogate and its file)"
         if stranger or limited:
             words += ["--plant", task.plant.name]
         identity = task.plant.identity()
@@ -175,7 +173,8 @@ class Predict:
             words += ["--surrogate", file]
         if limited:  # the file ends where the motors stand
             words += ["--rig", str(self.another_plant.plant_options["rig"]), "--horizon", f"{task.horizon_s:g}"]
-        return shlex.join(words)
+        missing = ", with the surrogate that the policy has learned on (--surrogate and its file)"
+        return shlex.join(words) + (missing if stranger and file is None else "")
 
     def _surrogate_file(self) -> str | None:
         """The surrogate that was given, or that the policy's run directory says it has learned on; None if unknown."""
