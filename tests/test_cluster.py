@@ -128,6 +128,12 @@ def test_a_run_that_always_loses_its_worker_fails(tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
+def test_a_machine_that_came_later_and_does_not_see_the_folder(tmp_path: Path) -> None:
+    """It must not look as if the sweep were over."""
+    with pytest.raises(InputError, match=f"of the cluster does not see {tmp_path / 'out'}"):
+        perform("run", Any, tmp_path / "out" / "run", Board(tmp_path / "out" / ".board", None), 20.0, 1)
+
+
 def drive(folder: str, address: str | None) -> None:
     """What a process that is to be killed does: go on with a sweep."""
     from test_sweep import quick

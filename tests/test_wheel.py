@@ -242,7 +242,10 @@ def test_every_library_that_is_imported_is_named() -> None:
             elif isinstance(node, ast.ImportFrom) and node.module:
                 imported.add(node.module.split(".")[0])
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    required = [*project["dependencies"], *project["optional-dependencies"]["onnx"]]
+    required = [
+        *project["dependencies"],
+        *(r for extra in ("cluster", "onnx") for r in project["optional-dependencies"][extra]),
+    ]
     named = {re.split(r"[^\w-]", requirement)[0].lower() for requirement in required}
     homes = packages_distributions()
     for module in imported - sys.stdlib_module_names - {"orient_eye"}:

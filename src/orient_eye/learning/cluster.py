@@ -149,6 +149,8 @@ def _connected(address: str | None) -> Iterator[None]:
     """With a driver of Ray in this process, and a Ray of its own where no address is given."""
     import ray
 
+    if ray.is_initialized():
+        raise InputError("this process is at work with Ray already; ray.shutdown() first")
     own = None if address else _short_folder()
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     try:

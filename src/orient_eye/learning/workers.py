@@ -6,6 +6,7 @@ with a checkpoint. On this machine it does so too when the one who waits is gone
 """
 
 import os
+import platform
 import signal
 import threading
 import time
@@ -98,7 +99,12 @@ def perform(run: str, config: TrainConfig, out: Path, board: Board, checkpoint_s
         board: of the sweep.
         checkpoint_s: seconds between checkpoints.
         cores: of the machine, for this worker's threads.
+
+    Raises:
+        InputError: a machine of the cluster, one that joined it later, does not see the folder.
     """
+    if board.waits is None and not board.folder.is_dir():
+        raise InputError(f"machine {platform.node()} of the cluster does not see {board.folder.parent}")
     if board.stopped or (out / "result.json").exists():
         return
     told = board.told(run)
