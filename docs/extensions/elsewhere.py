@@ -47,7 +47,7 @@ def _turn(app: Sphinx, name: str, source: list[str]) -> None:
         folder = (ROOT / page).parent
         below = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.md"))
         chapters = "\n".join(path.removesuffix(".md") for path in below if path != "README.md")
-        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{chapters}\n```\n"
+        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{chapters}\n```\n" if chapters else ""
 
 
 def on_site(page: str, link: str) -> str:
