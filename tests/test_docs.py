@@ -39,7 +39,7 @@ PAGES = [
     *SITE,
 ]
 EXAMPLES_OF_OTHERS = "spring"
-"""In the command lines of a package that CONTRIBUTING.md has as an example; tests/test_third_party.py runs them."""
+"""In the command lines of a package that docs/howto has as an example; tests/test_third_party.py runs them."""
 OPTION = re.compile(r"(?<!\S)--[a-z][a-z0-9-]*")
 
 
