@@ -44,6 +44,7 @@ def _turn(app: Sphinx, name: str, source: list[str]) -> None:
     if page.endswith(".md"):
         source[0] = _LINK.sub(lambda link: on_site(page, link[1]), source[0])
     if page.endswith("/README.md"):
+        app.env.note_reread()  # there may be others at the next build
         folder = (ROOT / page).parent
         below = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.md"))
         chapters = "\n".join(path.removesuffix(".md") for path in below if path != "README.md")

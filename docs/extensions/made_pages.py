@@ -49,11 +49,13 @@ def _make(app: Sphinx) -> None:
 
 
 def _list(app: Sphinx, name: str, source: list[str]) -> None:
-    del app
     if name == "reference/commands":
         source[0] += _listed_commands()
-    if name == "reference/python":
+    elif name == "reference/python":
         source[0] += f"\n```{{eval-rst}}\n{_listed_names()}```\n"
+    else:
+        return
+    app.env.note_reread()  # what is listed may be other at the next build
 
 
 def _write(folder: Path, pages: dict[str, str]) -> None:
