@@ -40,7 +40,8 @@ def cluster() -> Iterator[str]:
         from ray.cluster_utils import Cluster
 
         folder, memory = ours._short_folder(), 8 * 10**7
-        head = {"num_cpus": 1, "include_dashboard": False, "object_store_memory": memory, "temp_dir": str(folder)}
+        head = {"num_cpus": 1, "include_dashboard": False, "object_store_memory": memory}
+        patch.setenv("RAY_TMPDIR", str(folder))
         machines = Cluster(head_node_args=head)
         try:
             machines.add_node(num_cpus=1, object_store_memory=memory)
