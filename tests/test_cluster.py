@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -38,12 +39,16 @@ def cluster() -> Iterator[str]:
             patch.setenv(name, value)
         from ray.cluster_utils import Cluster
 
-        machines = Cluster(head_node_args={"num_cpus": 1, "include_dashboard": False, "object_store_memory": 8 * 10**7})
+        folder, memory = ours._short_folder(), 8 * 10**7
+        head = {"num_cpus": 1, "include_dashboard": False, "object_store_memory": memory}
+        patch.setenv("RAY_TMPDIR", str(folder))
+        machines = Cluster(head_node_args=head)
         try:
-            machines.add_node(num_cpus=1, object_store_memory=8 * 10**7)
+            machines.add_node(num_cpus=1, object_store_memory=memory)
             yield machines.address
         finally:
             machines.shutdown()
+            shutil.rmtree(folder)
 
 
 def noting(work: Callable[..., None], killed: str = "") -> Callable[..., None]:

@@ -62,11 +62,11 @@ def explained(path: str | Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno == errno.EEXIST:  # which is also said of a link that leads nowhere
+        if error.errno == errno.EEXIST:  # which is also said of a link that leads to itself
             try:
                 os.stat(path)
             except OSError as cause:
-                error = cause
+                error = cause if cause.errno == errno.ELOOP else error
         advice = _ADVICE.get(error.errno or 0, "name another file")
         raise InputError(f"cannot write {path}: {error.strerror or error}; {advice}") from error
 
