@@ -452,6 +452,7 @@ OF_OURS = {
     "validation.py": "shipped data",
     "human.py": "shipped data",
     "report/page.py": "the template of the page",
+    "learning/card.py": "the template of the card",
     "learning/figures/page.py": "the metrics of a run, while it is made",
     "learning/sweep_results.py": "the same",
     "learning/cluster.py": "a word that it has just written, to see whether another machine sees it",

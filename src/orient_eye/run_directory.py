@@ -45,7 +45,7 @@ class RunDirectory:
         Raises:
             InputError: the directory holds something already, belongs to another run, or cannot be made.
         """
-        path = path or Path("runs") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
+        path = path or unnamed(command)
         settings = asdict(config) if is_dataclass(config) and not isinstance(config, type) else config
         told = {
             "command": command,
@@ -82,6 +82,13 @@ class RunDirectory:
             InputError: it is missing or is not JSON.
         """
         return read_json(self.path / name, hint="this is no run directory, name one")
+
+
+def unnamed(command: str) -> Path:
+    """Where a run goes that was given no place: runs/COMMAND-DATE-TIME, with a number behind where that is taken."""
+    usual = Path("runs") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
+    names = (usual, *(usual.with_name(f"{usual.name}-{number}") for number in range(2, 100)))
+    return next((path for path in names if not path.exists()), usual)
 
 
 def versions() -> dict[str, str]:

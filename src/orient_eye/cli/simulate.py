@@ -119,7 +119,7 @@ class Simulate:
         if failed:
             say("the simulation diverged: the trajectory is empty (NaN)", "red")
         else:
-            say(f"the eye ends at yaw {last[0]:.3f}, pitch {last[1]:.3f}, roll {last[2]:.3f} deg")
+            say(f"the eye ends at yaw {last[0]:.3f}, pitch {last[1]:.3f}, roll {last[2]:.3f} deg (Fick's angles)")
         _say_motors(motors, limited=bool(result["limited"]))
         say(f"in {run.path}: trajectory.csv, .npz, .png, .rrd (orient-eye view {run.path}/trajectory.rrd)")
         return result

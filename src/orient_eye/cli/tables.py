@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:  # --help does not wait for rich
+    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:  # --help does not wait for rich
 Row: TypeAlias = Mapping[str, Any]
 Cell: TypeAlias = "str | Text"
 _WIDTH = 200  # of a log file or a pipe: no wrapping at the 80 columns of a missing terminal
+_WORDS = 16  # characters that a column of words has at least
 
 
 def say(message: "str | Table" = "", style: str = "") -> None:
@@ -27,8 +29,34 @@ def say(message: "str | Table" = "", style: str = "") -> None:
         console.width = _WIDTH
     if isinstance(message, str):
         console.print(_tame(message), style=style or None, soft_wrap=True)
-    else:
+    elif _fits(message, console.width):
         console.print(message)
+    else:
+        _say_in_lines(message, console)
+
+
+def _fits(made: "Table", width: int) -> bool:
+    """Whether nothing of a table would be cut off; words may go over several lines."""
+    inside = sum(
+        max(len(line) for cell in (each.header, *each.cells) for line in str(cell).splitlines() or [""])
+        if each.no_wrap
+        else _WORDS
+        for each in made.columns
+    )
+    return inside + 3 * len(made.columns) + 1 <= width
+
+
+def _say_in_lines(made: "Table", console: "Console") -> None:
+    """A table too wide for the terminal: a row after the other, with a line for each column."""
+    from rich.padding import Padding
+    from rich.table import Table
+
+    console.print(made.title, style="bold")
+    for row in zip(*(each.cells for each in made.columns), strict=True):
+        lines = Table.grid(padding=(0, 2))
+        for each, cell in zip(made.columns, row, strict=True):
+            lines.add_row(each.header, cell)
+        console.print(Padding(lines, (0, 0, 1, 2)))
 
 
 def _tame(text: str) -> str:
@@ -50,8 +78,9 @@ def table(
     from rich.table import Table
 
     made = Table(title=_tame(title), title_justify="left", title_style="bold")
-    for heading in columns:
-        made.add_column(heading, justify="left" if heading in left else "right")
+    for place, heading in enumerate(columns):
+        words = heading in left
+        made.add_column(heading, justify="left" if words else "right", no_wrap=not words or not place, overflow="fold")
     for row in rows:
         cells = (cell(row) for cell in columns.values())
         made.add_row(*(_tame(words) if isinstance(words, str) else words for words in cells))

@@ -85,7 +85,9 @@ class TrainingLoop(BaseCallback):
         if self.rows:
             speed = (n - self.done_before) / max(time.monotonic() - self.resumed, 1e-9)
             row = self.rows[-1]
-            note = f"reward {row['reward_mean']:.3g}  gap {100 * row['gap_mean']:.2f} %  {speed:.0f} updates/s"
+            note = f"gap {100 * row['gap_mean']:.2f} %"
+            if len(self.rows) > 1:  # before, nothing was learned from
+                note = f"reward {row['reward_mean']:.3g}  {note}  {speed:.0f} updates/s"
             if self.failed:
                 note += f"  {self.failed} saccades failed"
             self.advance(n / self.updates, note)

@@ -34,7 +34,7 @@ from orient_eye.learning.loop import CHECKPOINT_S, StopRequest
 from orient_eye.learning.sweep_results import Results, RunState
 from orient_eye.learning.training import Interrupted, alone, check_interval, prepared
 from orient_eye.learning.workers import DONE, FAILED, MOST_LOST, RUNNING, STOPPED, WAITING, Board, perform
-from orient_eye.run_directory import versions
+from orient_eye.run_directory import unnamed, versions
 
 NAME = "sweep.json"
 _BOARD = ".board"
@@ -70,7 +70,7 @@ class Sweep:
         """
         runs = {name: _plain(options) for name, options in runs.items()}
         _check(runs)  # before the folder: bad input leaves nothing behind
-        folder = folder or Path("runs") / f"sweep-{datetime.now():%Y%m%d-%H%M%S}"
+        folder = folder or unnamed("sweep")
         with explained(folder):
             folder.mkdir(parents=True, exist_ok=True)
         with alone(folder):

@@ -40,7 +40,7 @@ from orient_eye.learning.robust import DRAWS, over_the_interval
 from orient_eye.learning.sac import GazeFeatures, OneStepSAC, falling_temperature
 from orient_eye.plants.uncertain import uncertain
 from orient_eye.progress import progress_bar
-from orient_eye.run_directory import RunDirectory, versions
+from orient_eye.run_directory import RunDirectory, unnamed, versions
 from orient_eye.search.optimum_file import NAME as OPTIMUM
 from orient_eye.task.known_weights import bounds, compared_with_thesis
 from orient_eye.task.saccade import SaccadeTask
@@ -94,7 +94,7 @@ def train(
     """
     check_interval(checkpoint_s)
     task, settings = prepared(config)  # before the directory: bad input leaves nothing behind
-    out = out or Path("runs") / f"train-{datetime.now():%Y%m%d-%H%M%S}"
+    out = out or unnamed("train")
     with explained(out):
         out.mkdir(parents=True, exist_ok=True)
     with alone(out):

@@ -26,7 +26,7 @@ TENDON_COLOURS: tuple[Colour, ...] = (
 )  # fmt: skip
 _TURNS = {"yaw": "z", "pitch": "y", "torsion": "x"}  # an angle and the axis of its velocity
 STILL_DEG = 0.5
-"""Pitch and torsion that stay below are left out; torsion is shown, however small, where yaw and pitch both move."""
+"""Angles that stay below are left out; torsion is shown, however small, where yaw and pitch both move."""
 _TURN = 0.37  # of the circle of hues, from one curve of a saccade to the next
 _SAME = 1e-6  # of a motor's unit: a command that its motor follows to this is not drawn
 
@@ -95,7 +95,7 @@ class Curves:
         turned = [turned_by(q) for q in orientations]
         largest = {turn: max(float(abs(each[turn]).max(initial=0)) for each in turned) for turn in _TURNS}
         moving = {turn for turn in _TURNS if largest[turn] > STILL_DEG}
-        shown = moving | {"yaw"} | ({"torsion"} if {"yaw", "pitch"} <= moving else set())
+        shown = (moving or {"yaw"}) | ({"torsion"} if {"yaw", "pitch"} <= moving else set())
         self.turns = turns = [turn for turn in _TURNS if turn in shown]
         ahead = rotations.gaze(rotations.FORWARD)
         away = [rotations.angle_between_directions(rotations.gaze(q), ahead) for q in orientations]
@@ -119,7 +119,7 @@ class Curves:
     @property
     def graticule(self) -> Graticule:
         """By which the gaze is read: a protractor where only yaw moves, else a net of directions."""
-        if len(self.turns) > 1:
+        if self.turns != ["yaw"]:
             return net(self.eccentricity_deg)
         return protractor(max(self.largest_deg["yaw"], 30))
 
