@@ -150,7 +150,7 @@ def _write(path: Path, content: _Content, model: mujoco.MjModel) -> Path:
             if reference is not None and not reference.failed[k]:
                 scene.draw_reference(rec, f"{root}/reference", reference.orientation[k], reference.time)
             if scene.graticule.around_deg:
-                scene.draw_trace(rec, root, trajectory.orientation[k], tab.colour)
+                scene.draw_trace(rec, root, trajectory.orientation[k], tab.colour, named=not several)
                 scene.draw_moment(rec, root, trajectory.orientation[k], trajectory.time)
             if vectors:
                 vectors.draw_path(rec, f"{tab.root}/listing", trajectory.orientation[k], trajectory.time, tab.colour)

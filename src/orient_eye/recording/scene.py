@@ -187,14 +187,17 @@ class Scene:
         dots = rr.Points3D.columns(positions=self.reach * rotations.gaze(orientation))
         rec.send_columns(f"{path}/moment", [rr.TimeColumn(TIMELINE, duration=time)], dots)
 
-    def draw_trace(self, rec: "rr.RecordingStream", path: str, orientation: Array, colour: Colour) -> None:
-        """The way of the line of sight's end, orientation (time, 4), and a ring where it starts."""
+    def draw_trace(
+        self, rec: "rr.RecordingStream", path: str, orientation: Array, colour: Colour, *, named: bool
+    ) -> None:
+        """The way of the line of sight's end, orientation (time, 4), and a ring where it starts, which may say so."""
         import rerun as rr
 
         rec.log(f"{path}/trace", self._trace(orientation, colour), static=True)
         start = self.reach * ring(orientation[0])
         thin = 0.6 * _TRACE * self.reach
-        rec.log(f"{path}/start", rr.LineStrips3D([start], colors=[colour], radii=thin), static=True)
+        drawn = rr.LineStrips3D([start], colors=[colour], radii=thin, labels=["start"], show_labels=named)
+        rec.log(f"{path}/start", drawn, static=True)
 
     def _trace(self, orientation: Array, colour: Colour) -> "rr.LineStrips3D":
         import rerun as rr
