@@ -110,7 +110,8 @@ def recorded_steps(found: Identification) -> Figure:
         residual.set(title="measured - fitted", ylabel="residual [deg]")
         motor.set(title=str(step.source.get("motor", "motor")), ylabel="motor [deg]")
         residual.axhline(0, color="black", lw=0.6)
-        eye.legend(frameon=False, fontsize=8, loc="lower right")
+        down = step.eye_deg[-1] < step.eye_deg[0]
+        eye.legend(frameon=False, fontsize=8, loc="upper right" if down else "lower right")
         residual.legend(frameon=False, fontsize=8)
         for axes in line:
             tidy(axes)

@@ -14,6 +14,7 @@ from orient_eye.learning.figures.saccades import (
     speed,
     titled,
     turned,
+    until_ms,
 )
 from orient_eye.learning.policy import Policy
 from orient_eye.movement.trajectory import Trajectory
@@ -45,7 +46,7 @@ def figure_5_2(policy: Policy, task: SaccadeTask) -> Figure:
             xlabel="time [ms]",
             ylabel=f"{title} [{motors[driven[0]].unit}]",
             title=title,
-            xlim=(0, 200 if title == "pulse" else 300),
+            xlim=(0, 200 if title == "pulse" else until_ms(shown)),
         )
         if len(driven) > 1:
             axes.legend(frameon=False)
@@ -67,8 +68,8 @@ def figure_5_3(policy: Policy, task: SaccadeTask) -> Figure:
             time = 1e3 * trajectory.time
             left.plot(time, turned(trajectory)[i], style, color=colour, label=f"{size:g} deg, {words}")
             right.plot(time, speed(trajectory)[i], style, color=colour)
-    left.set(xlabel="time [ms]", ylabel="angle turned [deg]", xlim=(0, 300))
-    right.set(xlabel="time [ms]", ylabel="angular speed [deg/s]", xlim=(0, 300))
+    left.set(xlabel="time [ms]", ylabel="angle turned [deg]", xlim=(0, until_ms(shown)))
+    right.set(xlabel="time [ms]", ylabel="angular speed [deg/s]", xlim=(0, until_ms(shown)))
     left.set_ylim(bottom=0)
     beside(figure, *left.get_legend_handles_labels())
     tidy(left)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from orient_eye import rotations
 from orient_eye.cached import cached_property
 from orient_eye.figures import DATA, MODEL, OTHER, tidy
+from orient_eye.figures.gaze.style import end_ms
 from orient_eye.learning.directions import angles_toward, size_deg
 from orient_eye.learning.policy import Policy
 from orient_eye.movement.measures import Measures
@@ -131,12 +132,17 @@ def beside(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> Non
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize="small")
 
 
+def until_ms(shown: Saccades) -> float:
+    """Until when pictures over time go [ms]: to the thesis' 300, or a little beyond the last settling time."""
+    return max(300.0, end_ms(shown.trajectory, shown.outcome.measures))
+
+
 def draw_turned(axes: "Axes", shown: Saccades) -> None:
     """Progress of each saccade."""
     curves = zip(turned(shown.trajectory), shown.size_deg, colours(len(shown.target)), strict=True)
     for angle, size, colour in curves:
         axes.plot(1e3 * shown.trajectory.time, angle, color=colour, label=f"{size:g} deg")
-    axes.set(xlabel="time [ms]", ylabel="angle turned [deg]", xlim=(0, 300))
+    axes.set(xlabel="time [ms]", ylabel="angle turned [deg]", xlim=(0, until_ms(shown)))
     axes.set_ylim(bottom=0)
     tidy(axes)
 
@@ -146,7 +152,7 @@ def draw_speed(axes: "Axes", shown: Saccades) -> None:
     curves = zip(speed(shown.trajectory), shown.size_deg, colours(len(shown.target)), strict=True)
     for values, size, colour in curves:
         axes.plot(1e3 * shown.trajectory.time, values, color=colour, label=f"{size:g} deg")
-    axes.set(xlabel="time [ms]", ylabel="angular speed [deg/s]", xlim=(0, 300))
+    axes.set(xlabel="time [ms]", ylabel="angular speed [deg/s]", xlim=(0, until_ms(shown)))
     axes.set_ylim(bottom=0)
     axes.legend(frameon=False, fontsize="small", ncols=2)
     tidy(axes)
