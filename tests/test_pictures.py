@@ -5,14 +5,21 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from orient_eye.learning.policy import Policy
 from orient_eye.task.targets import saccades
-from road_picture import COLUMNS, LAYERS, curves, picture
+from road_picture import COLUMNS, LAYERS, Curves, curves, picture
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 _SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def what() -> Curves:
+    """Of the road: the policy's saccade and what stands beside it."""
+    return curves()
 
 
 def words(text: str) -> list[str]:
@@ -32,17 +39,16 @@ def test_the_road_asks_nothing_of_the_page_it_stands_on() -> None:
     assert {*COLUMNS, *(layer[0] for layer in LAYERS), "learner", "sysid", "search"} <= set(words(text))
 
 
-def test_the_road_is_what_the_script_draws() -> None:
+def test_the_road_is_what_the_script_draws(what: Curves) -> None:
     """To the stroke on one machine; simulated curves differ in the last digit on others, so here its words and size."""
     kept = (PICTURES / "road.svg").read_text(encoding="utf-8")
-    drawn = picture()
-    assert drawn == picture()
+    drawn = picture(what)
+    assert drawn == picture(what)
     assert words(kept) == words(drawn)
     assert abs(len(kept) / len(drawn) - 1) < 0.02, "python scripts/road_picture.py"
 
 
-def test_the_curves_of_the_road_are_the_policys() -> None:
-    what = curves()
+def test_the_curves_of_the_road_are_the_policys(what: Curves) -> None:
     task = Policy.load("mujoco-1").task()
     start, target = saccades(task.targets, [[0.0]], [[20.0]])
     action = Policy.load("mujoco-1").act(start.orientation, target)
