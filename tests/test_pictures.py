@@ -10,6 +10,7 @@ from PIL import Image
 
 from orient_eye.learning.policy import Policy
 from orient_eye.task.targets import saccades
+from page_pictures import KINDS, START, blocks, figures, pictures
 from road_picture import COLUMNS, LAYERS, Curves, curves, picture
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
@@ -58,6 +59,27 @@ def test_the_curves_of_the_road_are_the_policys(what: Curves) -> None:
     assert np.argmax(what.reward) not in (0, len(what.reward) - 1)
     assert what.reward.max() >= made.reward.total[0] - 50
     assert np.abs(what.stepped - what.fitted).max() < 0.5, "the surrogate is near the eye"
+
+
+def test_every_picture_is_made_by_the_script() -> None:
+    kept = {file.name for file in PICTURES.iterdir()}
+    assert kept == pictures()
+    assert {re.split(r"[-.]", name)[0] for name in kept} == set(KINDS)
+
+
+def test_pages_to_start_with_have_commands_for_their_pictures() -> None:
+    for page, made in START.items():
+        commands = "".join(blocks(page))
+        assert commands.count("orient-eye") >= 2
+        for file in made.values():
+            assert str(Path(file).parent) in commands or file in commands, file
+
+
+def test_the_reports_pictures_are_on_its_page() -> None:
+    page = (PICTURES.parent / "report.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"pictures/report-([\w.-]+)\.(?:svg|png)", page)) == sorted(figures())
+    with Image.open(PICTURES / "report-human.png") as image:
+        assert image.width == 1100
 
 
 def test_the_picture_of_the_eye_is_small_and_shows_something() -> None:
