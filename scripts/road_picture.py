@@ -559,9 +559,9 @@ def search(hand: Hand, what: Curves) -> None:
     hand.arrow(np.stack([930 + 92 * np.sin(turn), 500 + 64 * np.cos(turn)], axis=1), OCHRE, 2.2, 9)
 
 
-def picture() -> str:
+def picture(what: Curves) -> str:
     """The SVG."""
-    what, hand = curves(), Hand(np.random.default_rng(4))
+    hand = Hand(np.random.default_rng(4))
     for a, b in (((15, 11), (15, 789)), ((11, 15), (1189, 15)), ((1185, 11), (1185, 789)), ((11, 785), (1189, 785))):
         hand.stroke([a, b], PENCIL, 1.0, wobble=0.5, every=90)
     layers(hand)
@@ -599,4 +599,4 @@ class RoadPicture:
 
 
 if __name__ == "__main__":
-    write_text(tyro.cli(RoadPicture, description=__doc__).out, picture())
+    write_text(tyro.cli(RoadPicture, description=__doc__).out, picture(curves()))

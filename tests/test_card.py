@@ -77,7 +77,10 @@ def test_the_front_matter_is_that_of_a_model_hub(name: str) -> None:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_command_line_of_a_shipped_card_means_its_training(name: str) -> None:
     policy = Policy.load(name)
-    (line,) = re.findall(r"^    (orient-eye train.*)$", section(card(policy, name), "Training"), re.MULTILINE)
+    told = section(card(policy, name), "Training")
+    assert f"orient-eye {policy.manifest['versions']['orient-eye']}," in told
+    assert "With another version the same command may come to other numbers." in told
+    (line,) = re.findall(r"^    (orient-eye train.*)$", told, re.MULTILINE)
     settings = settings_of(line)
     policy.require(SaccadeTask.restore(settings["task"]))
     config = {key: value for key, value in policy.manifest["config"].items() if value is not None}

@@ -99,6 +99,20 @@ def test_links_lead_to_files_and_headings_that_are_there(page: Path) -> None:
             assert anchor in anchors(markdown(target)), f"{name_of(page)} links to {link}"
 
 
+FOLDERS = ("src", "eye_mjcf", "models", "tests", "scripts", "benchmarks", "examples", "docs", ".ci")
+NAMED = re.compile(rf"(?<![\w./-])(?:{'|'.join(map(re.escape, FOLDERS))})/[\w./*-]*\w(?![\w/])")
+
+
+def test_files_that_are_named_are_there(page: Path) -> None:
+    """In prose, in backticks and in command lines; tests/test_wheel.py has that all of them are shipped."""
+    named = {path for path in NAMED.findall(markdown(page)) if not any((ROOT / path).is_relative_to(m) for m in MADE)}
+    assert [path for path in sorted(named) if not any(ROOT.glob(path))] == []
+
+
+def test_pages_name_many_files() -> None:
+    assert len({path for each in PAGES for path in NAMED.findall(markdown(each))}) > 70
+
+
 def test_the_test_of_links_knows_headings() -> None:
     assert anchors("# The eye: `orient-eye listing`\n\n```sh\n# none\n```\n## What it is, [now](a.md)\n") == {
         "the-eye-orient-eye-listing",

@@ -22,8 +22,6 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("src", "eye_mjcf", "models", "tests", "scripts", "benchmarks", "examples", "docs", ".ci")
-GUIDES = [page for folder in ("docs", "docs/start", "docs/howto") for page in (ROOT / folder).glob("*.md")]
-PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", *(str(page.relative_to(ROOT)) for page in GUIDES))
 
 SHIPPED = {
     "eye_mjcf/eye3.xml",
@@ -169,20 +167,6 @@ def test_source_distribution_is_the_checkout(built: Built) -> None:
 
 def test_source_distribution_holds_no_rubbish(built: Built) -> None:
     assert files(built.source).isdisjoint(RUBBISH)
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_source_distribution_holds_what_a_page_names(page: str, built: Built) -> None:
-    text = (built.source / page).read_text()
-    tops = "|".join(map(re.escape, [*FOLDERS, "Makefile", "CONTRIBUTING.md", "CHANGELOG.md", "constraints.txt"]))
-    named = set(re.findall(rf"(?<![\w./-])(?:{tops})(?:/[\w./*-]*\w)?(?![\w/])", text))
-    linked = {
-        os.path.relpath((built.source / page).parent / link, built.source)
-        for link in re.findall(r"\]\(([^)#:]+)\)", text)
-    }
-    shipped = {path for path in named | linked if not f"{path}/".startswith(MADE)}
-    assert shipped
-    assert [path for path in sorted(shipped) if not any(built.source.glob(path))] == []
 
 
 def test_wheel_holds_the_package_alone(built: Built) -> None:
