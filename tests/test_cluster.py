@@ -216,6 +216,33 @@ def test_killed_itself_it_is_taken_up_again(
     assert_same(folder / "usual", alone[0])
 
 
+STRANGER = """
+import sys, ray
+ray.init(sys.argv[1], logging_level="CRITICAL", log_to_driver=False)
+sys.exit(ray.get(ray.remote(lambda: 42).remote()))
+"""
+OWNER = f"""
+import os, subprocess, sys
+from orient_eye.learning import cluster
+cluster.on_ray(None)
+with cluster._connected(None):
+    import ray
+    address = ray.get_runtime_context().gcs_address
+    for told in ({{}}, {{"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": cluster._password()}}):
+        environment = {{**os.environ, "RAY_NUM_REDIS_GET_RETRIES": "2", **told}}
+        print(subprocess.run([sys.executable, "-c", {STRANGER!r}, address], env=environment).returncode)
+"""
+
+
+def test_a_ray_of_its_own_is_nobody_elses(tmp_path: Path) -> None:
+    """Whatever the environment says of passwords and clusters; who knows the password gets in."""
+    told = {"RAY_AUTH_MODE": "disabled", "RAY_ADDRESS": "127.0.0.1:1", "HOME": str(tmp_path), **ours._QUIET}
+    owner = subprocess.run(
+        [sys.executable, "-c", OWNER], env={**os.environ, **told}, capture_output=True, timeout=120, check=True
+    )
+    assert owner.stdout.split() == [b"1", b"42"], owner.stderr.decode()
+
+
 # --- what cannot be -------------------------------------------------------------------------------
 
 

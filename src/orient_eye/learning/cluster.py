@@ -47,6 +47,7 @@ _LONGEST = 40  # characters of a temporary folder in which Ray's sockets have na
 _CLOSED_S, _SILENT_S = 5.0, 30.0  # until an address counts as one where nobody, or no Ray, answers
 _SEEN_S = 60.0  # until a machine has answered, and what it wrote is seen here: a network's file system is slow
 _TOKEN = "token"
+_MODE = "RAY_AUTH_MODE"
 
 
 def on_ray(address: str | None = None) -> "OnRay":
@@ -71,6 +72,8 @@ def on_ray(address: str | None = None) -> "OnRay":
 @dataclass(frozen=True)
 class OnRay:
     """Workers are Ray's.
+
+    Ray reads a password once a process: after a Ray of its own, a cluster that wants another password refuses this one.
 
     Attributes:
         address: of the cluster; None for one of its own.
@@ -183,8 +186,10 @@ def _options(address: str | None, own: Path | None) -> dict[str, Any]:
 def _surroundings(own: Path | None) -> Iterator[None]:
     """Environment variables for Ray; of one of its own with a password that nobody else knows."""
     told = _QUIET if own is None else _QUIET | {"RAY_AUTH_TOKEN": _password()}
-    before = {name: os.environ.get(name) for name in (*told, "RAY_AUTH_MODE")}  # which Ray sets
+    before = {name: os.environ.get(name) for name in (*told, _MODE)}
     os.environ.update(told)
+    if own is not None:
+        os.environ.pop(_MODE, None)  # Ray then turns passwords on itself; told "token" after its import it does not
     try:
         yield
     finally:
