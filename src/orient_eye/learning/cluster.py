@@ -18,7 +18,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -91,14 +91,24 @@ class OnRay:
                 nodes = {node["NodeID"]: node for node in ray.nodes() if node["Alive"] and _cpus(node)}
                 if not nodes:
                     raise InputError(f"the cluster at {self.address} has no core to work with; {_HINT}")
-                everyone = sum(map(_cpus, nodes.values()))
-                jobs = min(jobs_of(jobs, everyone), runs)
-                share = max(1, min(everyone // jobs, *map(_cpus, nodes.values())))
+                cpus = [_cpus(node) for node in nodes.values()]
+                jobs = min(jobs_of(jobs, sum(cpus)), runs)
+                share = share_of(cpus, jobs)
                 _check(nodes, board)
                 with parallel_config(backend=_Tasks(share)):
                     yield Crew(jobs, share, parent=None)
             except (ray.exceptions.RayError, ConnectionError) as error:
                 raise InputError(f"the Ray cluster failed: {_brief(error)}; the same command again goes on") from error
+
+
+def share_of(cpus: Sequence[int], jobs: int) -> int:
+    """Cores of each run: the most with which all fit at a time, each on one machine; one where they never do.
+
+    Args:
+        cpus: cores of each machine, (machines,).
+        jobs: runs at a time.
+    """
+    return next((share for share in range(max(cpus), 1, -1) if sum(own // share for own in cpus) >= jobs), 1)
 
 
 class _Tasks(ParallelBackendBase):  # type: ignore[misc]  # joblib has no types
