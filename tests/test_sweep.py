@@ -108,6 +108,18 @@ def test_names_say_what_differs_and_are_each_a_folder_of_their_own() -> None:
     assert config_of(mixed["mujoco-eyeeve-v3"]).plant_options == {"eye": "eve_v3"}
 
 
+def test_many_runs_that_look_alike_are_named_apart_in_no_time() -> None:
+    began = time.process_time()
+    assert len(named(product_of({"seed": tuple(range(10**4))}))) == 10**4
+    names = named(product_of({"origin": ["a" + "/" * k for k in range(1, 5001)]}))
+    assert time.process_time() - began < 5  # by the square of the number it takes longer than ten
+    assert len({name.casefold() for name in names}) == 5000
+    assert max(map(len, names)) < 120
+    for runs in ([{"origin": "a/b"}, {"origin": "a b"}, {"origin": "a b"}], [{"a": 1, "b": 2}, {"b": 2, "a": 1}]):
+        with pytest.raises(InputError, match="two runs of the sweep are the same"):
+            named(runs)
+
+
 def test_the_command_line_and_a_file_say_the_same(tmp_path: Path) -> None:
     told = "--plant lpf --case 1 2-fixed --seed 0 1 2 --weights 1 2 3 4 --temperature auto --robust --end-point-error 1"
     command = parse(Command, [*told.split(), *WORDS])
