@@ -287,6 +287,28 @@ def test_a_run_that_fails_stops_no_other_and_is_tried_again(
     assert parse(Command, ["--resume", str(tmp_path / "out"), "--jobs", "1"]).run()["passed"]
 
 
+def test_runs_that_are_over_are_not_looked_at_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of ten thousand runs that is what there is to do, twice a second."""
+    sweep = Sweep.begin(runs_of(seed=tuple(range(6))), tmp_path / "out")
+    board = workers.Board(tmp_path, os.getpid())
+    over: dict[str, RunState] = {}
+    for seed, state in enumerate(("done", "failed", "running", "stopped")):
+        board.tell(f"seed{seed}", state, why="it fell over" if state == "failed" else "")
+    (tmp_path / "out" / "seed0").mkdir()
+    (tmp_path / "out" / "seed0" / "result.json").touch()
+    states = sweep._states(board, over)
+    assert [each.state for each in states] == ["done", "failed", "running", "stopped", "waiting", "waiting"]
+    assert states[1].why == "it fell over"
+    asked: list[str] = []
+    told = workers.Board.told
+    monkeypatch.setattr(workers.Board, "told", lambda board, run: asked.append(run) or told(board, run))
+    board.tell("seed4", "running")
+    again = sweep._states(board, over)
+    assert asked == ["seed2", "seed3", "seed4"]
+    assert [each.state for each in again] == ["done", "failed", "running", "stopped", "running", "waiting"]
+    assert sweep.states(board) == again
+
+
 # --- workers --------------------------------------------------------------------------------------
 
 
