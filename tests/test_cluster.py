@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from orient_eye.cli import main
@@ -120,6 +121,47 @@ def test_a_run_lost_with_its_worker_goes_on_in_another(
     assert not (folder / ".board").exists()
 
 
+@pytest.mark.parametrize(
+    ("cpus", "jobs", "share"),
+    [
+        ((5, 5), 3, 2),  # of 3 each only two would fit
+        ((5, 5), 2, 5),
+        ((5, 5), 4, 2),
+        ((5, 5), 5, 1),
+        ((5, 5), 10, 1),
+        ((5, 5), 11, 1),  # one waits
+        ((5, 5), 1, 5),
+        ((1, 64), 8, 8),
+        ((1, 64), 9, 7),
+        ((3, 7, 16), 4, 5),
+        ((1, 1), 1, 1),
+    ],
+)
+def test_runs_share_the_cores_so_that_all_fit(cpus: tuple[int, ...], jobs: int, share: int) -> None:
+    assert ours.share_of(cpus, jobs) == share
+
+
+def test_no_larger_share_would_fit() -> None:
+    """Against runs put on machines one by one."""
+    random = np.random.default_rng(0)
+
+    def fit(cpus: list[int], jobs: int, share: int) -> bool:
+        left = list(cpus)
+        for _ in range(jobs):
+            i = max(range(len(left)), key=left.__getitem__)
+            left[i] -= share
+            if left[i] < 0:
+                return False
+        return True
+
+    for _ in range(200):
+        cpus = random.integers(1, 20, random.integers(1, 6)).tolist()
+        jobs = int(random.integers(1, sum(cpus) + 1))
+        share = ours.share_of(cpus, jobs)
+        assert fit(cpus, jobs, share)
+        assert not any(fit(cpus, jobs, more) for more in range(share + 1, 21))
+
+
 def test_a_run_that_always_loses_its_worker_fails(tmp_path: Path) -> None:
     """Counted on the board, wherever its workers are."""
     board = Board(tmp_path, None)
@@ -214,6 +256,33 @@ def test_killed_itself_it_is_taken_up_again(
     if not (folder / "usual" / "result.json").exists():  # the run may have been quicker
         assert sweep.carry_out(jobs=1)["passed"]
     assert_same(folder / "usual", alone[0])
+
+
+STRANGER = """
+import sys, ray
+ray.init(sys.argv[1], logging_level="CRITICAL", log_to_driver=False)
+sys.exit(ray.get(ray.remote(lambda: 42).remote()))
+"""
+OWNER = f"""
+import os, subprocess, sys
+from orient_eye.learning import cluster
+cluster.on_ray(None)
+with cluster._connected(None):
+    import ray
+    address = ray.get_runtime_context().gcs_address
+    for told in ({{}}, {{"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": cluster._password()}}):
+        environment = {{**os.environ, "RAY_NUM_REDIS_GET_RETRIES": "2", **told}}
+        print(subprocess.run([sys.executable, "-c", {STRANGER!r}, address], env=environment).returncode)
+"""
+
+
+def test_a_ray_of_its_own_is_nobody_elses(tmp_path: Path) -> None:
+    """Whatever the environment says of passwords and clusters; who knows the password gets in."""
+    told = {"RAY_AUTH_MODE": "disabled", "RAY_ADDRESS": "127.0.0.1:1", "HOME": str(tmp_path), **ours._QUIET}
+    owner = subprocess.run(
+        [sys.executable, "-c", OWNER], env={**os.environ, **told}, capture_output=True, timeout=120, check=True
+    )
+    assert owner.stdout.split() == [b"1", b"42"], owner.stderr.decode()
 
 
 # --- what cannot be -------------------------------------------------------------------------------

@@ -108,6 +108,18 @@ def test_names_say_what_differs_and_are_each_a_folder_of_their_own() -> None:
     assert config_of(mixed["mujoco-eyeeve-v3"]).plant_options == {"eye": "eve_v3"}
 
 
+def test_many_runs_that_look_alike_are_named_apart_in_no_time() -> None:
+    began = time.process_time()
+    assert len(named(product_of({"seed": tuple(range(10**4))}))) == 10**4
+    names = named(product_of({"origin": ["a" + "/" * k for k in range(1, 5001)]}))
+    assert time.process_time() - began < 5  # by the square of the number it takes longer than ten
+    assert len({name.casefold() for name in names}) == 5000
+    assert max(map(len, names)) < 120
+    for runs in ([{"origin": "a/b"}, {"origin": "a b"}, {"origin": "a b"}], [{"a": 1, "b": 2}, {"b": 2, "a": 1}]):
+        with pytest.raises(InputError, match="two runs of the sweep are the same"):
+            named(runs)
+
+
 def test_the_command_line_and_a_file_say_the_same(tmp_path: Path) -> None:
     told = "--plant lpf --case 1 2-fixed --seed 0 1 2 --weights 1 2 3 4 --temperature auto --robust --end-point-error 1"
     command = parse(Command, [*told.split(), *WORDS])
@@ -273,6 +285,28 @@ def test_a_run_that_fails_stops_no_other_and_is_tried_again(
     assert make_task is TrainSettings.make_task
     broken.clear()
     assert parse(Command, ["--resume", str(tmp_path / "out"), "--jobs", "1"]).run()["passed"]
+
+
+def test_runs_that_are_over_are_not_looked_at_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of ten thousand runs that is what there is to do, twice a second."""
+    sweep = Sweep.begin(runs_of(seed=tuple(range(6))), tmp_path / "out")
+    board = workers.Board(tmp_path, os.getpid())
+    over: dict[str, RunState] = {}
+    for seed, state in enumerate(("done", "failed", "running", "stopped")):
+        board.tell(f"seed{seed}", state, why="it fell over" if state == "failed" else "")
+    (tmp_path / "out" / "seed0").mkdir()
+    (tmp_path / "out" / "seed0" / "result.json").touch()
+    states = sweep._states(board, over)
+    assert [each.state for each in states] == ["done", "failed", "running", "stopped", "waiting", "waiting"]
+    assert states[1].why == "it fell over"
+    asked: list[str] = []
+    told = workers.Board.told
+    monkeypatch.setattr(workers.Board, "told", lambda board, run: asked.append(run) or told(board, run))
+    board.tell("seed4", "running")
+    again = sweep._states(board, over)
+    assert asked == ["seed2", "seed3", "seed4"]
+    assert [each.state for each in again] == ["done", "failed", "running", "stopped", "running", "waiting"]
+    assert sweep.states(board) == again
 
 
 # --- workers --------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -47,6 +47,7 @@ _LONGEST = 40  # characters of a temporary folder in which Ray's sockets have na
 _CLOSED_S, _SILENT_S = 5.0, 30.0  # until an address counts as one where nobody, or no Ray, answers
 _SEEN_S = 60.0  # until a machine has answered, and what it wrote is seen here: a network's file system is slow
 _TOKEN = "token"
+_MODE = "RAY_AUTH_MODE"
 
 
 def on_ray(address: str | None = None) -> "OnRay":
@@ -72,6 +73,8 @@ def on_ray(address: str | None = None) -> "OnRay":
 class OnRay:
     """Workers are Ray's.
 
+    Ray reads a password once a process: after a Ray of its own, a cluster that wants another password refuses this one.
+
     Attributes:
         address: of the cluster; None for one of its own.
     """
@@ -88,14 +91,24 @@ class OnRay:
                 nodes = {node["NodeID"]: node for node in ray.nodes() if node["Alive"] and _cpus(node)}
                 if not nodes:
                     raise InputError(f"the cluster at {self.address} has no core to work with; {_HINT}")
-                everyone = sum(map(_cpus, nodes.values()))
-                jobs = min(jobs_of(jobs, everyone), runs)
-                share = max(1, min(everyone // jobs, *map(_cpus, nodes.values())))
+                cpus = [_cpus(node) for node in nodes.values()]
+                jobs = min(jobs_of(jobs, sum(cpus)), runs)
+                share = share_of(cpus, jobs)
                 _check(nodes, board)
                 with parallel_config(backend=_Tasks(share)):
                     yield Crew(jobs, share, parent=None)
             except (ray.exceptions.RayError, ConnectionError) as error:
                 raise InputError(f"the Ray cluster failed: {_brief(error)}; the same command again goes on") from error
+
+
+def share_of(cpus: Sequence[int], jobs: int) -> int:
+    """Cores of each run: the most with which all fit at a time, each on one machine; one where they never do.
+
+    Args:
+        cpus: cores of each machine, (machines,).
+        jobs: runs at a time.
+    """
+    return next((share for share in range(max(cpus), 1, -1) if sum(own // share for own in cpus) >= jobs), 1)
 
 
 class _Tasks(ParallelBackendBase):  # type: ignore[misc]  # joblib has no types
@@ -183,8 +196,10 @@ def _options(address: str | None, own: Path | None) -> dict[str, Any]:
 def _surroundings(own: Path | None) -> Iterator[None]:
     """Environment variables for Ray; of one of its own with a password that nobody else knows."""
     told = _QUIET if own is None else _QUIET | {"RAY_AUTH_TOKEN": _password()}
-    before = {name: os.environ.get(name) for name in (*told, "RAY_AUTH_MODE")}  # which Ray sets
+    before = {name: os.environ.get(name) for name in (*told, _MODE)}
     os.environ.update(told)
+    if own is not None:
+        os.environ.pop(_MODE, None)  # Ray then turns passwords on itself; told "token" after its import it does not
     try:
         yield
     finally:

@@ -10,6 +10,7 @@ Options are those of `TrainConfig` and of its plant, by name, side by side.
 import itertools
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
@@ -34,9 +35,11 @@ def product_of(values: Mapping[str, Sequence[Any]]) -> list[Options]:
     for option, of in values.items():
         if not of:
             raise InputError(f"{option} names no value; give at least one, or leave it out")
-        for i, value in enumerate(of):
-            if any(_same(value, other) for other in of[:i]):
+        seen: set[str] = set()
+        for value in of:
+            if repr(value) in seen:
                 raise InputError(f"{option} names {shown(value)} twice; name each value once")
+            seen.add(repr(value))
     count = math.prod(len(of) for of in values.values())
     if count > _MOST:
         raise InputError(f"a sweep has at most {_MOST} runs, this grid has {count}; make several sweeps of it")
@@ -55,13 +58,18 @@ def named(runs: Sequence[Options]) -> dict[str, Options]:
     names = sorted({name for run in runs for name in run}, key=_place)
     varied = [name for name in names if not all(name in run and _same(run[name], runs[0].get(name)) for run in runs)]
     found: dict[str, Options] = {}
+    seen: set[str] = set()
+    alike: Counter[str] = Counter()
     for run in runs:
-        parts = (_part(name, run[name]) for name in varied if name in run)
-        name = "-".join(parts)[:_LONGEST].strip(".") or "usual"
-        if name in found and _same(found[name], run):
+        told = repr(sorted(run.items()))
+        if told in seen:
             raise InputError(f"two runs of the sweep are the same: {run or 'no option'}; name each once")
+        seen.add(told)
+        parts = (_part(name, run[name]) for name in varied if name in run)
+        name = usual = "-".join(parts)[:_LONGEST].strip(".") or "usual"
         while name in found:  # values that look alike in a folder's name
-            name += "+"
+            alike[usual] += 1
+            name = f"{usual}+{alike[usual]}"
         found[name] = run
     return found
 

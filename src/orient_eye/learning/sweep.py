@@ -153,14 +153,24 @@ class Sweep:
 
     def states(self, board: Board | None = None) -> list[RunState]:
         """How it stands with every run."""
+        return self._states(board, {})
+
+    def _states(self, board: Board | None, over: dict[str, RunState]) -> list[RunState]:
+        """The same, without a look at the runs that are over, which are then remembered there."""
         results, found = Results(self.folder, self.runs), []
+        known = set() if board is None else board.known()
         for name in self.runs:
-            told = {"state": WAITING} if board is None else board.told(name)
+            if name in over:
+                found.append(over[name])
+                continue
+            told = board.told(name) if board is not None and name in known else {"state": WAITING}
             done = results.done(name)
             state = DONE if done else told["state"]
             state = WAITING if state == DONE and not done else state
             update, gap = results.course(name) if state == RUNNING else (None, None)
             found.append(RunState(name, state, update, gap, told.get("why", ""), tuple(told.get("notes", ()))))
+            if state in (DONE, FAILED):
+                over[name] = found[-1]
         return found
 
     def _board(self) -> Path:
@@ -229,10 +239,11 @@ class Sweep:
             yield
             return
         over = threading.Event()
+        ended: dict[str, RunState] = {}
 
         def inform() -> None:
             while not over.wait(_SHOWN_S):
-                show(self.states(board))
+                show(self._states(board, ended))
 
         informing = threading.Thread(target=inform, daemon=True)
         informing.start()

@@ -69,6 +69,10 @@ class Board:
             found = None
         return found if isinstance(found, dict) else {"state": WAITING, "why": "", "notes": [], "lost": 0}
 
+    def known(self) -> set[str]:
+        """Runs of which something was told."""
+        return {file.removesuffix(".json") for file in os.listdir(self.folder) if file.endswith(".json")}
+
     def stop(self) -> None:
         """Have all workers stop."""
         write_text(self.folder / "stop", "")
