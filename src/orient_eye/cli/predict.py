@@ -217,7 +217,6 @@ class Predict:
             written.append(each)
         write_table(folder / "index.csv", index)
         say(f"{len(written)} motor commands in {folder}, listed in {folder / 'index.csv'}")
-        beyond = [each.file.name for each in written if each.too_fast]
-        if beyond:
-            say(f"beyond their motors' limits: {', '.join(beyond)}", "red")
+        for beyond in (each for each in written if each.too_fast):
+            beyond.say("motor command")
         return written
