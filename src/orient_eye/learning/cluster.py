@@ -16,6 +16,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -327,4 +328,4 @@ def _name(node: Mapping[str, Any]) -> str:
 def _brief(error: object) -> str:
     """The last line of what Ray says, which has the cause."""
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines() if line.strip()]
-    return lines[-1][:300] if lines else type(error).__name__
+    return textwrap.shorten(lines[-1], 300, placeholder=" ...") if lines else type(error).__name__

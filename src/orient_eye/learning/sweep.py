@@ -12,6 +12,7 @@ import shlex
 import shutil
 import signal
 import sys
+import textwrap
 import threading
 import warnings
 from collections import Counter
@@ -68,8 +69,8 @@ class Sweep:
         Raises:
             InputError: a run that cannot be, or the folder is taken by something else, or cannot be made.
         """
-        runs = {name: _plain(options) for name, options in runs.items()}
         _check(runs)  # before the folder: bad input leaves nothing behind
+        runs = {name: _plain(options) for name, options in runs.items()}
         folder = folder or Path("runs") / f"sweep-{datetime.now():%Y%m%d-%H%M%S}"
         with explained(folder):
             folder.mkdir(parents=True, exist_ok=True)
@@ -77,8 +78,9 @@ class Sweep:
             if (folder / NAME).exists():
                 there = cls._read(folder)
                 if there.runs != runs:
+                    other = f"{folder} is of another sweep, of {len(there.runs)} runs: {', '.join(there.runs)}"
                     raise InputError(
-                        f"{folder} is of another sweep, of {len(there.runs)} runs: {', '.join(there.runs)}"[:400]
+                        textwrap.shorten(other, 400, placeholder=" ...")
                         + "; name another folder with --out, or go on with that one by --resume"
                     )
             elif any(folder.iterdir()):
@@ -293,5 +295,12 @@ def _check(runs: Mapping[str, Options]) -> None:
 
 
 def _plain(options: Options) -> Options:
-    """As sweep.json holds them."""
-    return parse_json(json.dumps(finite(options)))
+    """As sweep.json holds them.
+
+    Raises:
+        InputError: a number is not finite.
+    """
+    try:
+        return parse_json(json.dumps(options, allow_nan=False, default=finite))
+    except ValueError as error:
+        raise InputError(f"options of a sweep are finite numbers, got {options}") from error
