@@ -29,7 +29,7 @@ from joblib import Parallel, delayed
 from orient_eye.errors import Ended, InputError
 from orient_eye.files import explained, finite, parse_json, read_json, write_json
 from orient_eye.learning.config import TrainConfig
-from orient_eye.learning.engines import ENGINES, Crew, Engine
+from orient_eye.learning.engines import ENGINES, LOST, Crew, Engine
 from orient_eye.learning.grid import Options, config_of, without_seed
 from orient_eye.learning.loop import CHECKPOINT_S, StopRequest
 from orient_eye.learning.sweep_results import Results, RunState
@@ -222,7 +222,10 @@ class Sweep:
         )
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="A worker stopped while some jobs")  # and another took its place
-            Parallel(n_jobs=crew.jobs, pre_dispatch=crew.jobs, batch_size=1, max_nbytes=None)(work)
+            parallel = Parallel(n_jobs=crew.jobs, pre_dispatch=crew.jobs, batch_size=1, max_nbytes=None)
+            for name, came in zip(configs, parallel(work), strict=True):
+                if came == LOST:
+                    board.tell(name, FAILED, "its workers were killed again and again; do they start, is memory short?")
 
     def _in_turn(self) -> list[str]:
         """Names of the runs, the first of each setting first: what it searches, the others of that setting find."""
