@@ -175,6 +175,32 @@ def test_a_run_that_always_loses_its_worker_fails(tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
+def test_a_run_whose_workers_die_before_they_begin_fails(
+    cluster: str,
+    quickly: None,  # noqa: F811
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Handed out so many times and no more; the other runs are done."""
+    work = noting(sweeps.perform)
+
+    def perform(run: str, config: Any, out: Path, *given: Any) -> None:
+        if run == "seed0":
+            with (out.parent / f"{run}.pids").open("a") as told:
+                told.write(f"{os.getpid()}\n")
+            os.kill(os.getpid(), signal.SIGKILL)
+        work(run, config, out, *given)
+
+    monkeypatch.setattr(sweeps, "perform", perform)
+    monkeypatch.setattr(ours, "_RETRIES", 2)
+    folder = tmp_path / "out"
+    result = Sweep.begin(runs_of(seed=(0, 1)), folder).carry_out(engine=OnRay(cluster))
+    assert list(result["failed"]) == ["seed0"]
+    assert "killed again and again" in result["failed"]["seed0"]
+    assert result["done"] == 1
+    assert len(pids(folder, "seed0")) == 3
+
+
 def test_a_machine_that_came_later_and_does_not_see_the_folder(tmp_path: Path) -> None:
     """It must not look as if the sweep were over."""
     with pytest.raises(InputError, match=f"of the cluster does not see {tmp_path / 'out'}"):

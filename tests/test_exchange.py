@@ -410,3 +410,27 @@ def test_convert_a_simulation_and_a_policy(tmp_path: Path, capsys: pytest.Captur
     assert table["yaw_deg"].to_numpy()[-1] == pytest.approx(20, abs=0.5)
     assert run("convert", "lpf-1", "--rate", "500", "--bids", str(tmp_path / "d"), capsys=capsys)["saccades"] == 6
     assert read_gaze(tmp_path / "d" / f"{PHYSIO}.tsv.gz").rate_hz == pytest.approx(500)
+
+
+@pytest.mark.parametrize(("policy", "eye"), [("lpf-1", "left"), ("six-gaze", "right")])
+def test_the_eye_that_was_recorded(policy: str, eye: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("--target", *("10 0" if policy == "six-gaze" else "10").split(), "--bids", str(tmp_path / "set"))
+    run("convert", policy, *words, capsys=capsys)
+    assert json.loads((tmp_path / "set" / f"{PHYSIO}.json").read_text())["RecordedEye"] == eye
+
+
+@pytest.mark.parametrize("plant", ["--plant modal --surrogate six-3d", "--plant tavares --eye six"])
+def test_the_eye_of_a_simulation(plant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Told by its result; of a file that went elsewhere it is not known."""
+    (tmp_path / "command.csv").write_text("t_s,MR_deg\n0,57.29577951308232\n0.3,60\n")
+    run("simulate", "--motor", f"{tmp_path}/command.csv", *plant.split(), "--out", f"{tmp_path}/run", capsys=capsys)
+    shutil.copy(tmp_path / "run" / "trajectory.npz", tmp_path / "alone.npz")
+    for source, eye in (("run", "right"), ("alone.npz", "left")):
+        folder = tmp_path / f"set-{source}"
+        run("convert", f"{tmp_path}/{source}", "--bids", str(folder), capsys=capsys)
+        assert json.loads((folder / f"{PHYSIO}.json").read_text())["RecordedEye"] == eye
+
+
+def test_an_eye_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="left or the right eye, got 'both'"):
+        write_bids(tmp_path / "set", three(), eye="both")

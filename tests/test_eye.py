@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from orient_eye.errors import InputError
 from orient_eye.eyes import EYES
 from orient_eye.eyes.elastics import Elastics
-from orient_eye.eyes.model import STANDARD_GRAVITY, Tendons, ball, build_model, model_hash, motors
+from orient_eye.eyes.model import STANDARD_GRAVITY, Tendons, ball, build_model, model_hash, motors, side
 from orient_eye.motor import names, ranges
 from orient_eye.plants.elastic import ElasticPlant
 from orient_eye.plants.mujoco import MujocoPlant
@@ -397,3 +397,18 @@ def test_weight_of_the_shell_agrees_with_its_mesh(make_meshes: ModuleType) -> No
     np.testing.assert_allclose(weighed.centre_of_mass, mesh.center_mass, atol=1e-4)
     inertia = mesh.moment_inertia_frame(np.eye(4))  # about the origin
     np.testing.assert_allclose(np.diag(weighed.inertia), inertia, rtol=5e-3, atol=1e-9)
+
+
+def test_the_side_of_an_eye(tmp_path: Path) -> None:
+    """The medial rectus of a right eye is on its left: from the point on the head at which it begins."""
+    folder = data_folder("eye_mjcf")
+    model = build_model("six")
+    head = [site for site in range(model.nsite) if "MR" in model.site(site).name and model.site_bodyid[site] == 0]
+    assert head
+    assert all(model.site_pos[site][1] > 0 for site in head)
+    assert side(model) == "right"
+    assert side(build_model("thesis")) == side(build_model("eve_v3")) == side(ball()) == "left"
+    text = (folder / "eye6.xml").read_text(encoding="utf-8").replace('meshdir="meshes"', f'meshdir="{folder}/meshes"')
+    (tmp_path / "odd.xml").write_text(text.replace('data="right"', 'data="middle"'), encoding="utf-8")
+    with pytest.raises(InputError, match=r"side.* is left or right, got 'middle'"):
+        side(build_model(str(tmp_path / "odd.xml")))

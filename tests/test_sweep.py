@@ -30,7 +30,7 @@ from orient_eye.learning.grid import config_of, named, product_of
 from orient_eye.learning.loop import StopRequest
 from orient_eye.learning.policy import Policy
 from orient_eye.learning.spread import spread
-from orient_eye.learning.sweep import Sweep
+from orient_eye.learning.sweep import Sweep, _plain
 from orient_eye.learning.sweep_results import RunState
 from orient_eye.learning.training import Interrupted, train
 from orient_eye.resources import cores
@@ -160,6 +160,11 @@ def test_tables_of_runs_are_grids_beside_one_another(tmp_path: Path) -> None:
         ("[options]\ncase = '9'", "case = '9' .* invalid choice"),
         ("[options]\nout = 'x'", "out = 'x' is no option"),
         ("[options]\nhelp = true", "help = True is no option"),
+        ("[options]\nupdates = 1.5", r"updates = 1\.5 .* \.\.\.$"),
+        ("[options]\nseed = [[0, 1], [2]]", "a list in a list is one value of several numbers, which seed has not"),
+        ("[options]\nseed = [[0], [2]]", "write its values side by side"),
+        ("[options]\nrobust = [[true], false]", "which robust has not"),
+        ("[options]\nweights = [[[1, 2, 3, 4], [4, 3, 2, 1]]]", "write its values side by side"),
         ("[options]\nseed = []", "seed names no value"),
         ("[options]\nseed = [1, 1]", "seed names 1 twice"),
         ("[options]\nseed = 1\n[[runs]]\n[[runs]]", "two runs of the sweep are the same"),
@@ -259,6 +264,26 @@ def test_bad_values_are_found_before_the_first_run(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=message):
             Sweep.begin(runs_of(**values), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_train_refuses_is_refused_in_its_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "sweep.toml"
+    for text, words in (
+        ("weights = [1, 2, nan, 3]", "--weights 1 2 nan 3"),
+        ("eye = 'nosuch'", "--eye nosuch"),
+        ("plant = 'mujoco'\neye = 'nosuch'", "--plant mujoco --eye nosuch"),
+    ):
+        file.write_text(f"[options]\n{text}\n")
+        said = []
+        for command in (["train", *words.split()], ["sweep", *words.split()], ["sweep", str(file)]):
+            with pytest.raises(SystemExit) as ended:
+                main([*command, "--out", str(tmp_path / "out"), "--json"])
+            assert ended.value.code == 2
+            said.append(json.loads(capsys.readouterr().out)["error"])
+        assert said[0] == said[1] == said[2]
+    with pytest.raises(InputError, match="finite"):
+        _plain({"of another package": float("inf")})
     assert not (tmp_path / "out").exists()
 
 

@@ -10,6 +10,7 @@ from orient_eye.cli.saccades import Saccades
 
 if TYPE_CHECKING:
     from orient_eye.movement.trajectory import Trajectory
+    from orient_eye.plants import Plant
 
 _OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
 _NAME = "trajectory.npz"
@@ -59,10 +60,11 @@ class Convert:
         check_outputs({"--parquet": self.parquet}, {"SOURCE": file, "--pairs": self.saccades.pairs})
         if self.bids:
             check_folder(self.bids)
-        trajectory, source = self._read(file)
+        trajectory, source, plant = self._read(file)
         written = []
         if self.bids:
-            written += write_bids(self.bids, trajectory, subject=self.subject, rate_hz=self.rate, source=source)
+            of = {"subject": self.subject, "source": source, "eye": _side(plant, file)}
+            written += write_bids(self.bids, trajectory, rate_hz=self.rate, **of)
         if self.parquet:
             written.append(write_parquet(self.parquet, trajectory))
         failed = int(trajectory.failed.sum())
@@ -85,8 +87,8 @@ class Convert:
             return path / _NAME
         return path if path.suffix == ".npz" else None
 
-    def _read(self, file: Path | None) -> "tuple[Trajectory, str]":
-        """The saccades, and in words what they are."""
+    def _read(self, file: Path | None) -> "tuple[Trajectory, str, Plant | None]":
+        """The saccades, in words what they are, and the plant that made them; None where that is not known."""
         from orient_eye.errors import InputError
         from orient_eye.movement.trajectory import Trajectory
 
@@ -95,9 +97,9 @@ class Convert:
             return self._made()
         if any(option is not None for option in chosen):
             raise InputError(f"--start, --target and --pairs are a policy's; {file} has its saccades, leave them out")
-        return Trajectory.load_npz(file), f"simulation {file.parent.name}"
+        return Trajectory.load_npz(file), f"simulation {file.parent.name}", _plant_of(file.parent)
 
-    def _made(self) -> "tuple[Trajectory, str]":
+    def _made(self) -> "tuple[Trajectory, str, Plant]":
         """Saccades of a policy."""
         import os
 
@@ -127,4 +129,27 @@ class Convert:
             ends = self.saccades.angles(task.targets, drawn=True)
         start, target = saccades(task.targets, *ends)
         made = task.trajectory(start, policy.act(start.orientation, target), target)
-        return made, f"policy {Path(self.source).name} on plant {plant_in_words(task.plant.identity())}"
+        return made, f"policy {Path(self.source).name} on plant {plant_in_words(task.plant.identity())}", task.plant
+
+
+def _plant_of(folder: Path) -> "Plant | None":
+    """The plant of a simulation, as its result tells; None where there is none, or it cannot be had."""
+    from orient_eye.errors import InputError
+    from orient_eye.files import read_json
+    from orient_eye.plants import restore_plant
+
+    try:
+        return restore_plant(read_json(folder / "result.json", hint="")["plant"])
+    except (InputError, LookupError, TypeError, AttributeError):
+        return None
+
+
+def _side(plant: "Plant | None", file: Path | None) -> str:
+    """Which eye was recorded."""
+    from orient_eye.cli.tables import say
+    from orient_eye.eyes.model import side
+
+    if plant is not None:
+        return side(plant.drawn())
+    say(f"note: no result beside {file} says which eye that was; the data set has it as a left one", "yellow")
+    return "left"

@@ -12,7 +12,7 @@ given of them is its value, by name: {"case": ("1", "2-fixed"), "seed": (0, 1, 2
 
 import inspect
 import operator
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import Field, dataclass, field, fields, is_dataclass, make_dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -232,10 +232,18 @@ def _given(plant: str | None, parsed: Any) -> dict[str, Any]:
     unsaid = [name for name in options if name != _RIG] if plant is None else []
     if unsaid:
         raise InputError(f"{_flag(unsaid[0])} says more about a plant; name the plant too, by --plant")
-    if plant is None or not options:
-        return options
+    if plant is not None:
+        check_plant_options(plant, options)
+    return options
+
+
+def check_plant_options(plant: str, options: Iterable[str]) -> None:
+    """Refuse options of other plants.
+
+    Raises:
+        InputError: names the first.
+    """
     has = {option.name for option in PLANTS[plant].options}
     for name in options:
         if name not in has:
             raise InputError(f"{_flag(name)} does nothing on plant {plant!r}; leave it out or choose another plant")
-    return options

@@ -2,6 +2,7 @@
 
 import io
 import re
+import textwrap
 import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr, redirect_stdout
@@ -63,10 +64,11 @@ class Sweep:
 
     def run(self) -> dict[str, Any]:
         """Begin or go on."""
+        from orient_eye.cli.options import check_plant_options
         from orient_eye.cli.tables import say
         from orient_eye.errors import InputError
         from orient_eye.learning.engines import ENGINES, jobs_of
-        from orient_eye.learning.grid import named, product_of
+        from orient_eye.learning.grid import named, plant_options, product_of
         from orient_eye.learning.sweep import Sweep as Folder
         from orient_eye.learning.training import Interrupted, check_interval
         from orient_eye.progress import live
@@ -83,6 +85,8 @@ class Sweep:
             sweep = Folder.open(self.resume)
         else:
             runs = read_runs(self.file) if self.file else product_of(self.grid)
+            for plant, *options in {(run.get("plant", TrainConfig.plant), *plant_options(run)) for run in runs}:
+                check_plant_options(plant, options)
             sweep = Folder.begin(named(runs), self.out)
         done = sum(state.state == "done" for state in sweep.states())
         say(f"{len(sweep.runs)} runs in {sweep.folder}" + (f", {done} done already" if done else ""))
@@ -176,6 +180,13 @@ def _values_of_one(file: Path, name: str, value: Any) -> dict[str, tuple[Any, ..
 
     if isinstance(value, list) and value and all(isinstance(each, bool | list | dict) for each in value):
         parts = [_values_of_one(file, name, each) for each in value]
+        for each, part in zip(value, parts, strict=True):
+            (values,) = part.values() or ((),)
+            if isinstance(each, list) and (len(values) != 1 or not isinstance(values[0], tuple)):
+                raise InputError(
+                    f"{file}: {name} = {shown(value)}: a list in a list is one value of several numbers, which "
+                    f"{name} has not; write its values side by side, {name} = [A, B]"
+                )
         (key,) = {key for part in parts for key in part} or {name}
         return {key: tuple(one for part in parts for one in part.get(key, (False,)))}
     if value is False:
@@ -187,8 +198,8 @@ def _values_of_one(file: Path, name: str, value: Any) -> dict[str, tuple[Any, ..
         with redirect_stderr(said), redirect_stdout(said):  # a help page too
             read = _parsed([flag, *words])
     except SystemExit:
-        why = " ".join(re.sub(r"-{5,}|[│╭╮╰╯─]", " ", said.getvalue()).split())
-        raise InputError(f"{file}: {name} = {shown(value)} is no option of orient-eye train: {why[:300]}") from None
+        why = textwrap.shorten(re.sub(r"-{5,}|[│╭╮╰╯─]", " ", said.getvalue()), 300, placeholder=" ...")
+        raise InputError(f"{file}: {name} = {shown(value)} is no option of orient-eye train: {why}") from None
     if len(read) != 1:
         raise InputError(f"{file}: {name} = {shown(value)} is not one option with its values")
     return read

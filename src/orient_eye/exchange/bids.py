@@ -58,8 +58,9 @@ def write_bids(
     subject: str = "robot",
     rate_hz: float | None = None,
     source: str = "orient-eye",
+    eye: str = "left",
 ) -> list[Path]:
-    """Write a data set of one participant, and one recording of its left eye; returns its files.
+    """Write a data set of one participant, and one recording of one eye; returns its files.
 
     The saccades stand one after the other, as `orient_eye.exchange.record.recorded` says; gaps are `n/a`. Saccades that
     failed have no event, nor have those that are never faster than the threshold.
@@ -70,12 +71,15 @@ def write_bids(
         subject: label of the participant, letters and digits.
         rate_hz: samples in a second; None for that of the trajectory.
         source: what the saccades are, in words.
+        eye: which it is, left or right (`orient_eye.eyes.model.side`).
 
     Raises:
-        InputError: a label that is none, a folder that holds something, or what `recorded` refuses.
+        InputError: a label or an eye that is none, a folder that holds something, or what `recorded` refuses.
     """
     if not (subject.isascii() and subject.isalnum()):
         raise InputError(f"the label of a participant is made of letters and digits, got {subject!r}; sub- is added")
+    if eye not in ("left", "right"):
+        raise InputError(f"a recording is of the left or the right eye, got {eye!r}")
     folder = Path(folder)
     check_folder(folder)
     record = recorded(trajectory, rate_hz)
@@ -84,7 +88,7 @@ def write_bids(
     samples = np.column_stack([gaze.time, gaze.horizontal_deg, gaze.vertical_deg, listing.torsion(q), q])
     about = {
         "PhysioType": "eyetrack",
-        "RecordedEye": "left",
+        "RecordedEye": eye,
         "SampleCoordinateSystem": "eye-in-head",
         "SamplingFrequency": record.rate_hz,
         "StartTime": 0,

@@ -324,6 +324,22 @@ _PHYSICS = (
 )  # fmt: skip
 
 
+def side(model: mujoco.MjModel) -> str:
+    """Which eye of a head it is, "left" or "right": the custom text `side` of its file; left where it says nothing.
+
+    Raises:
+        InputError: another text.
+    """
+    i = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, "side")
+    if i < 0:
+        return "left"
+    begin = model.text_adr[i]
+    told = model.text_data[begin : begin + model.text_size[i] - 1].decode(errors="replace")
+    if told not in ("left", "right"):
+        raise InputError(f"the custom text 'side' of an eye is left or right, got {told!r}")
+    return told
+
+
 def model_hash(model: mujoco.MjModel) -> str:
     """Identity of an eye: SHA-256 over everything that moves it, 16 digits.
 

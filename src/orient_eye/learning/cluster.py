@@ -16,6 +16,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -32,7 +33,8 @@ from joblib.parallel import ParallelBackendBase
 from orient_eye.checks import shown
 from orient_eye.errors import InputError
 from orient_eye.files import write_text
-from orient_eye.learning.engines import Crew, jobs_of
+from orient_eye.learning.engines import LOST, Crew, jobs_of
+from orient_eye.learning.workers import MOST_LOST
 from orient_eye.resources import cores
 
 _INSTALL = 'Ray is not installed; pip install "orient-eye[cluster]"'
@@ -46,6 +48,7 @@ _STORE = 100 * 2**20  # bytes of Ray's memory for objects, of which there are no
 _LONGEST = 40  # characters of a temporary folder in which Ray's sockets have names that are short enough
 _CLOSED_S, _SILENT_S = 5.0, 30.0  # until an address counts as one where nobody, or no Ray, answers
 _SEEN_S = 60.0  # until a machine has answered, and what it wrote is seen here: a network's file system is slow
+_RETRIES = 2 * MOST_LOST  # of workers: `perform` counts those that it has begun in, here are those lost before
 _TOKEN = "token"
 _MODE = "RAY_AUTH_MODE"
 
@@ -126,7 +129,7 @@ class _Tasks(ParallelBackendBase):  # type: ignore[misc]  # joblib has no types
     def configure(self, *arguments: Any, **more: Any) -> int:
         import ray
 
-        self.task = ray.remote(num_cpus=self.share, max_retries=-1)(_call)  # `perform` counts
+        self.task = ray.remote(num_cpus=self.share, max_retries=_RETRIES)(_call)
         return super().configure(*arguments, **more)
 
     def submit(self, func: Callable[[], Any], callback: Callable[[Any], object] | None = None) -> Any:
@@ -136,7 +139,12 @@ class _Tasks(ParallelBackendBase):  # type: ignore[misc]  # joblib has no types
         return future
 
     def retrieve_result_callback(self, out: Any) -> Any:
-        return out.result()
+        from ray.exceptions import NodeDiedError, WorkerCrashedError
+
+        try:
+            return out.result()
+        except (NodeDiedError, WorkerCrashedError):  # once too often; the others go on
+            return [LOST]
 
 
 def _call(work: Callable[[], Any]) -> Any:
@@ -327,4 +335,4 @@ def _name(node: Mapping[str, Any]) -> str:
 def _brief(error: object) -> str:
     """The last line of what Ray says, which has the cause."""
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines() if line.strip()]
-    return lines[-1][:300] if lines else type(error).__name__
+    return textwrap.shorten(lines[-1], 300, placeholder=" ...") if lines else type(error).__name__

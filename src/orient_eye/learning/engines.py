@@ -17,6 +17,8 @@ from typing import Protocol
 from orient_eye.checks import whole
 from orient_eye.registry import Registry
 
+LOST = "lost"
+"""What an engine has for a run that it handed out again and again, and each worker was lost."""
 _MOST_JOBS = 1024
 
 
@@ -45,7 +47,7 @@ class Engine(Protocol):
         """Workers, for as long as the block lasts; in it `joblib.Parallel` hands work to them.
 
         A run whose worker is lost is handed out again, by the engine itself or, where it cannot, after
-        `BrokenProcessPool`.
+        `BrokenProcessPool`; if the engine gives it up, its result is `LOST`.
 
         Args:
             jobs: runs at a time; None for what the engine has cores for.

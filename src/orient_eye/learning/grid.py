@@ -83,6 +83,11 @@ def config_of(options: Options) -> TrainConfig:
     return TrainConfig(**own, plant_options=values)
 
 
+def plant_options(options: Options) -> Options:
+    """Those of the plant."""
+    return {name: value for name, value in options.items() if name not in _OWN}
+
+
 def without_seed(options: Options) -> Options:
     """The setting of a run: what its repetitions have in common."""
     return {name: value for name, value in options.items() if name != "seed"}

@@ -12,6 +12,7 @@ import shlex
 import shutil
 import signal
 import sys
+import textwrap
 import threading
 import warnings
 from collections import Counter
@@ -28,7 +29,7 @@ from joblib import Parallel, delayed
 from orient_eye.errors import Ended, InputError
 from orient_eye.files import explained, finite, parse_json, read_json, write_json
 from orient_eye.learning.config import TrainConfig
-from orient_eye.learning.engines import ENGINES, Crew, Engine
+from orient_eye.learning.engines import ENGINES, LOST, Crew, Engine
 from orient_eye.learning.grid import Options, config_of, without_seed
 from orient_eye.learning.loop import CHECKPOINT_S, StopRequest
 from orient_eye.learning.sweep_results import Results, RunState
@@ -68,8 +69,8 @@ class Sweep:
         Raises:
             InputError: a run that cannot be, or the folder is taken by something else, or cannot be made.
         """
-        runs = {name: _plain(options) for name, options in runs.items()}
         _check(runs)  # before the folder: bad input leaves nothing behind
+        runs = {name: _plain(options) for name, options in runs.items()}
         folder = folder or unnamed("sweep")
         with explained(folder):
             folder.mkdir(parents=True, exist_ok=True)
@@ -77,8 +78,9 @@ class Sweep:
             if (folder / NAME).exists():
                 there = cls._read(folder)
                 if there.runs != runs:
+                    other = f"{folder} is of another sweep, of {len(there.runs)} runs: {', '.join(there.runs)}"
                     raise InputError(
-                        f"{folder} is of another sweep, of {len(there.runs)} runs: {', '.join(there.runs)}"[:400]
+                        textwrap.shorten(other, 400, placeholder=" ...")
                         + "; name another folder with --out, or go on with that one by --resume"
                     )
             elif any(folder.iterdir()):
@@ -220,7 +222,10 @@ class Sweep:
         )
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="A worker stopped while some jobs")  # and another took its place
-            Parallel(n_jobs=crew.jobs, pre_dispatch=crew.jobs, batch_size=1, max_nbytes=None)(work)
+            parallel = Parallel(n_jobs=crew.jobs, pre_dispatch=crew.jobs, batch_size=1, max_nbytes=None)
+            for name, came in zip(configs, parallel(work), strict=True):
+                if came == LOST:
+                    board.tell(name, FAILED, "its workers were killed again and again; do they start, is memory short?")
 
     def _in_turn(self) -> list[str]:
         """Names of the runs, the first of each setting first: what it searches, the others of that setting find."""
@@ -293,5 +298,12 @@ def _check(runs: Mapping[str, Options]) -> None:
 
 
 def _plain(options: Options) -> Options:
-    """As sweep.json holds them."""
-    return parse_json(json.dumps(finite(options)))
+    """As sweep.json holds them.
+
+    Raises:
+        InputError: a number is not finite.
+    """
+    try:
+        return parse_json(json.dumps(options, allow_nan=False, default=finite))
+    except ValueError as error:
+        raise InputError(f"options of a sweep are finite numbers, got {options}") from error
