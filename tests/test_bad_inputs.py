@@ -120,7 +120,7 @@ LINES: list[tuple[str, str]] = [
     ("sweep --nosuch 1", "Unrecognized options: --nosuch"),
     ("sweep --case 1 9", "invalid choice '9' for argument '--case'"),
     ("sweep --updates 8 0", "run updates0: updates must be a whole number from 1"),
-    ("sweep --seed 0 1 --eye thesis", "run seed0: plant 'lpf': .*'eye'; its options are"),
+    ("sweep --seed 0 1 --eye thesis", "--eye does nothing on plant 'lpf'"),
     ("sweep --seed 0 1 --from nosuch", "nosuch is no policy"),
     ("sweep --seed 0 1 --jobs 0", "runs at a time must be a whole number from 1 to 1024, got 0"),
     ("sweep --seed 0 1 --checkpoint-every nan", "checkpoint"),
