@@ -163,7 +163,9 @@ def test_a_policy_is_held_to_its_own_prediction(
     (told,) = Predict(policy, Saccades((0.0,), (20.0,)), command=command, another_plant=there).run()["saccades"]
     assert "with the surrogate that the policy has learned on" in capsys.readouterr().err
     surrogate = str(replace(MODEL, axis="yaw", rig=rig.to_plain()).save(tmp_path / "my surrogate.json"))
-    (tmp_path / "policy" / "run.json").write_text(json.dumps({"config": {"plant_options": {"surrogate": surrogate}}}))
+    (tmp_path / "policy" / "run.json").write_text(
+        json.dumps({"command_line": shlex.join(["orient-eye", "train", "--surrogate", surrogate])})
+    )
     Predict(policy, Saccades((0.0,), (20.0,)), command=command, another_plant=there).run()
     typed = capsys.readouterr().err.replace("\n", " ").split("to try it: orient-eye ")[1].strip()
     with pytest.raises(SystemExit, match="0"):

@@ -177,7 +177,9 @@ class Predict:
         return shlex.join(words) + (missing if stranger and file is None else "")
 
     def _surrogate_file(self) -> str | None:
-        """The surrogate that was given, or that the policy's run directory says it has learned on; None if unknown."""
+        """The surrogate that was given, or with which its training was typed; None if unknown."""
+        import shlex
+
         from orient_eye.cli.places import policy_file
         from orient_eye.errors import InputError
         from orient_eye.run_directory import RunDirectory
@@ -185,9 +187,9 @@ class Predict:
         named = self.another_plant.plant_options.get("surrogate")
         if named is None:
             try:
-                config = RunDirectory(policy_file(self.policy).parent).read_json("run.json")["config"]
-                named = config["plant_options"]["surrogate"]
-            except (InputError, KeyError, TypeError):  # a policy by itself, or another's run
+                typed = shlex.split(RunDirectory(policy_file(self.policy).parent).read_json("run.json")["command_line"])
+                named = typed[typed.index("--surrogate") + 1]
+            except (InputError, LookupError, TypeError, ValueError):  # a policy by itself, or begun from Python
                 return None
         return str(named) if Path(str(named)).is_file() else None
 
